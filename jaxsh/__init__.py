@@ -1,0 +1,31 @@
+"""Spherical-harmonic lighting in JAX.
+
+Each room below is a module that loads when it is first used, so that ``import jaxsh`` costs
+little beyond ``import jax``::
+
+    import jaxsh
+
+    basis = jaxsh.harmonics.evaluate(directions, degree=4)
+"""
+
+import importlib as _importlib
+from typing import TYPE_CHECKING as _TYPE_CHECKING
+
+if _TYPE_CHECKING:
+    from . import geometry as geometry
+    from . import harmonics as harmonics
+    from . import imaging as imaging
+    from . import sphere as sphere
+
+__all__ = ["geometry", "harmonics", "imaging", "sphere"]
+__version__ = "0.1.0"
+
+
+def __getattr__(name: str):
+    if name in __all__:
+        return _importlib.import_module(f".{name}", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {__all__}")
+
+
+def __dir__():
+    return [*__all__, "__version__"]
