@@ -1,1 +1,37 @@
-"""(being built)"""
+"""Real spherical harmonics: the basis and its gradient, rotation, products, kernels, windows.
+
+Orthonormal, no Condon–Shortley phase, index i = l(l+1) + m, coefficients on the last axis. A
+function of degree L has K = (L+1)² coefficients. Directions are x, y, z.
+"""
+
+from ._basis import evaluate, evaluate_with_gradient
+from ._indexing import degree_of, degrees, index, num_coefficients, orders
+from ._products import gaunt, product, product_matrix, triple_integral
+from ._rotation import rotate, rotate_z, rotation_matrix
+from ._tables import legendre
+from ._windows import damping, dering, window
+from ._zonal import clamped_cosine, convolve, phong
+
+__all__ = [
+    "clamped_cosine",
+    "convolve",
+    "damping",
+    "degree_of",
+    "degrees",
+    "dering",
+    "evaluate",
+    "evaluate_with_gradient",
+    "gaunt",
+    "index",
+    "legendre",
+    "num_coefficients",
+    "orders",
+    "phong",
+    "product",
+    "product_matrix",
+    "rotate",
+    "rotate_z",
+    "rotation_matrix",
+    "triple_integral",
+    "window",
+]

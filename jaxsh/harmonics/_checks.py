@@ -1,0 +1,29 @@
+"""Bad input met early: one sentence that says what was expected and what came."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+
+def as_float(value: ArrayLike) -> Float[Array, "..."]:
+    """As a floating-point JAX array; integers become JAX's default float."""
+    array = jnp.asarray(value)
+    if jnp.issubdtype(array.dtype, jnp.floating):
+        return array
+    if jnp.issubdtype(array.dtype, jnp.integer):
+        return array.astype(jnp.result_type(float))
+    raise ValueError(f"expected real numbers, got dtype {array.dtype}")
+
+
+def is_concrete(value: Array) -> bool:
+    """True outside of tracing, where a value can be looked at at no cost to compiled code."""
+    return not isinstance(value, jax.core.Tracer)
+
+
+def align(*arrays: Array) -> tuple[Array, ...]:
+    """Leading axes of length 1 for those of lower rank, so that batches broadcast.
+
+    Said out loud, since under `jax_numpy_rank_promotion="raise"` JAX does not do it silently.
+    """
+    ndim = max(array.ndim for array in arrays)
+    return tuple(array.reshape((1,) * (ndim - array.ndim) + array.shape) for array in arrays)

@@ -1,0 +1,119 @@
+"""Products of functions on the sphere.
+
+Everything here is ∫ y_i y_j y_k over a grid that is exact for it. The Gaunt tensor of these
+integrals is 3.7 % full at degree 10, yet on batches of functions two dense matrix products with
+the basis on the grid (sample, multiply, project) are faster than the tensor at every degree.
+"""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ._checks import align, as_float
+from ._grid import exact_grid
+from ._indexing import check_degree, degree_of, num_coefficients
+
+# Functions per pass of `product`: their samples stay in cache.
+_BLOCK = 1024
+
+
+def gaunt(degree: int) -> Float[Array, "k k k"]:
+    """G_ijk = ∫ y_i y_j y_k dω, dense, in JAX's default float type.
+
+    Exact zeros are zero. Needs 8 K³ bytes: 14 MB at degree 10, 60 MB at 13.
+    """
+    return jnp.asarray(_gaunt(check_degree(degree)))
+
+
+def product(
+    f: Float[ArrayLike, "*batch_f kf"], g: Float[ArrayLike, "*batch_g kg"], degree: int | None = None
+) -> Float[Array, "*batch k"]:
+    """Coefficients of the product f·g, up to `degree` (default: that of the larger input).
+
+    f·g has the degrees of f and g together: asked for that degree the product is exact, below it
+    is the exact product's projection. Batches broadcast; the degrees of f and g may differ.
+    Bilinear and differentiable. Raises `ValueError` unless K is a square.
+    """
+    f, g, f_degree, g_degree = _checked_pair(f, g)
+    degree = max(f_degree, g_degree) if degree is None else check_degree(degree)
+    return _product(f, g, degree)
+
+
+def triple_integral(
+    f: Float[ArrayLike, "*batch_f kf"],
+    g: Float[ArrayLike, "*batch_g kg"],
+    h: Float[ArrayLike, "*batch_h kh"],
+) -> Float[Array, "*batch"]:
+    """∫ f g h dω = Σ_ijk G_ijk f_i g_j h_k, for functions of any degrees. Batches broadcast."""
+    f, g, *_ = _checked_pair(f, g)
+    f, h, _, h_degree = _checked_pair(f, h)
+    return jnp.sum(jnp.multiply(*align(_product(f, g, h_degree), h)), axis=-1)
+
+
+def product_matrix(
+    f: Float[ArrayLike, "*batch kf"], degree: int | None = None
+) -> Float[Array, "*batch k k"]:
+    """Matrix M of the multiplication with f: M @ g = coefficients of f·g, at g's own degree.
+
+    M_ij = ∫ f y_i y_j dω, symmetric. `degree` is that of g and of the result (default: f's).
+    For a light f and a transfer function g this is the operator that shades with it (Lee & Kim
+    2014, L̂ of eq. 3). Linear and differentiable in f.
+    """
+    f = as_float(f)
+    f_degree = degree_of(f.shape[-1] if f.ndim else 0)
+    return _product_matrix(f, f_degree if degree is None else check_degree(degree))
+
+
+@functools.lru_cache(maxsize=4)
+def _gaunt(degree: int) -> Float[np.ndarray, "k k k"]:
+    grid = exact_grid(3 * degree, degree)
+    weighted = (grid.basis * grid.weights).T
+    tensor = np.stack([(row * grid.basis) @ weighted for row in grid.basis])
+    # Rounding leaves 1e-14 where the smallest true entry is 7e-4 at degree 10, 1e-5 at 30.
+    tensor[np.abs(tensor) < 1e-9] = 0.0
+    return tensor
+
+
+@functools.partial(jax.jit, static_argnums=2)
+def _product(f, g, degree: int):
+    f_degree, g_degree = degree_of(f.shape[-1]), degree_of(g.shape[-1])
+    grid = exact_grid(f_degree + g_degree + degree, max(f_degree, g_degree, degree))
+    basis = jnp.asarray(grid.basis, f.dtype)
+    project = jnp.asarray((grid.basis * grid.weights)[: num_coefficients(degree)].T, f.dtype)
+
+    def multiply(pair):
+        samples = (_matmul(one, basis[: one.shape[-1]]) for one in pair)
+        return _matmul(next(samples) * next(samples), project)
+
+    batch = jnp.broadcast_shapes(f.shape[:-1], g.shape[:-1])
+    pair = tuple(jnp.broadcast_to(one, (*batch, one.shape[-1])) for one in (f, g))
+    if np.prod(batch) <= _BLOCK:
+        return multiply(pair)
+    rows = jax.tree.map(lambda one: one.reshape(-1, one.shape[-1]), pair)
+    return jax.lax.map(multiply, rows, batch_size=_BLOCK).reshape(*batch, -1)
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _product_matrix(f, degree: int):
+    f_degree = degree_of(f.shape[-1])
+    grid = exact_grid(f_degree + 2 * degree, max(f_degree, degree))
+    basis = jnp.asarray(grid.basis, f.dtype)
+    samples = _matmul(f, jnp.asarray(grid.basis[: f.shape[-1]] * grid.weights, f.dtype))
+    basis = basis[: num_coefficients(degree)]
+    return _matmul(jnp.multiply(*align(samples[..., None, :], basis)), basis.T)
+
+
+def _matmul(a, b):
+    # On GPUs and TPUs the default would round the inputs to half their digits.
+    return jnp.matmul(a, b, precision="highest")
+
+
+def _checked_pair(f: ArrayLike, g: ArrayLike):
+    f, g = as_float(f), as_float(g)
+    f_degree = degree_of(f.shape[-1] if f.ndim else 0)
+    g_degree = degree_of(g.shape[-1] if g.ndim else 0)
+    dtype = jnp.promote_types(f.dtype, g.dtype)
+    return f.astype(dtype), g.astype(dtype), f_degree, g_degree

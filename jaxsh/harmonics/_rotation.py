@@ -1,0 +1,92 @@
+"""Rotation of functions on the sphere."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ._basis import evaluate
+from ._checks import align, as_float, is_concrete
+from ._grid import even_grid
+from ._indexing import check_degree, degree_of, degrees, orders
+
+
+def rotation_matrix(
+    rotation: Float[ArrayLike, "*batch 3 3"], degree: int
+) -> Float[Array, "*batch k k"]:
+    """Matrix D with which `D @ c` are the coefficients of f(Rᵀω): the function f turned by R.
+
+    Any degree; block diagonal with one block per degree. D_ij = ∫ y_i(ω) y_j(Rᵀω) dω by a
+    quadrature that is exact for it, so D is as smooth in R as the basis in its argument: there
+    are no Euler angles to be singular, and derivatives are right at the identity and at half
+    turns too. Reflections are as welcome as rotations.
+
+    Raises `ValueError` for a wrong shape and, where values are known before tracing, for a matrix
+    that is not orthogonal to 1e-3. Differentiable in `rotation`, along any direction: f(Rᵀω/|Rᵀω|)
+    is its extension to matrices that are not orthogonal.
+    """
+    rotation = _checked_rotation(rotation)
+    return _rotation_matrix(rotation, check_degree(degree))
+
+
+def rotate(
+    coefficients: Float[ArrayLike, "*batch k"], rotation: Float[ArrayLike, "*rotations 3 3"]
+) -> Float[Array, "*out k"]:
+    """Coefficients of f(Rᵀω): the function turned by R. See `rotation_matrix`.
+
+    Batches of functions and of rotations broadcast against each other. Linear in the coefficients
+    and differentiable in both.
+    """
+    coefficients = as_float(coefficients)
+    degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
+    matrix = _rotation_matrix(_checked_rotation(rotation).astype(coefficients.dtype), degree)
+    if matrix.ndim == 2:
+        return jnp.matmul(coefficients, matrix.T, precision="highest")
+    return jnp.einsum("...ij,...j->...i", matrix, coefficients, precision="highest")
+
+
+def rotate_z(
+    coefficients: Float[ArrayLike, "*batch k"], angle: Float[ArrayLike, "*angles"]
+) -> Float[Array, "*out k"]:
+    """Turn a function by `angle` radians about +z, from +x towards +y: O(K), no matrix.
+
+    c'_lm = cos(mα) c_lm - sin(mα) c_l,-m (Habel et al. 2008, eq. 4, with m signed). Batches of
+    functions and of angles broadcast. Differentiable in both.
+    """
+    coefficients = as_float(coefficients)
+    degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
+    m = orders(degree)
+    mirrored = coefficients[..., np.arange(len(m)) - 2 * m]
+    phase = jnp.asarray(angle, coefficients.dtype)[..., None]
+    phase = jnp.multiply(*align(phase, jnp.asarray(m, phase.dtype)))
+    coefficients, mirrored, phase = align(coefficients, mirrored, phase)
+    return jnp.cos(phase) * coefficients - jnp.sin(phase) * mirrored
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _rotation_matrix(rotation: Float[Array, "*batch 3 3"], degree: int) -> Float[Array, "..."]:
+    grid = even_grid(degree)
+    directions = jnp.asarray(grid.directions, rotation.dtype)
+    turned = jnp.matmul(directions, rotation, precision="highest")  # rows Rᵀω
+    weighted = jnp.asarray(grid.basis * grid.weights, rotation.dtype)
+    matrix = jnp.einsum(
+        "in,j...n->...ij", weighted, evaluate(turned, degree, axis=0), precision="highest"
+    )
+    same_degree = np.equal.outer(degrees(degree), degrees(degree))
+    return jnp.where(same_degree, matrix, jnp.zeros_like(matrix))
+
+
+def _checked_rotation(rotation: ArrayLike) -> Float[Array, "*batch 3 3"]:
+    rotation = as_float(rotation)
+    if rotation.shape[-2:] != (3, 3):
+        raise ValueError(f"expected rotation matrices (..., 3, 3), got shape {rotation.shape}")
+    if is_concrete(rotation):
+        matrix = np.asarray(rotation, np.float64)
+        error = np.max(np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)), initial=0.0)
+        if not error <= 1e-3:
+            raise ValueError(
+                f"expected orthogonal matrices, but R Rᵀ is off the identity by {error:.1e}"
+            )
+    return rotation
