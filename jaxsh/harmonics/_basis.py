@@ -59,7 +59,9 @@ def evaluate_with_gradient(
 
 def _checked(vectors, degree, axis):
     if axis not in (0, -1):
-        raise ValueError(f"axis must be -1, coefficients last, or 0, coefficients first, got {axis}")
+        raise ValueError(
+            f"axis must be -1, coefficients last, or 0, coefficients first, got {axis}"
+        )
     vectors = as_float(vectors)
     if vectors.ndim == 0 or vectors.shape[-1] != 3:
         raise ValueError(f"expected vectors (..., 3) with x, y, z last, got shape {vectors.shape}")
@@ -90,7 +92,9 @@ def _evaluate_with_gradient(vectors, degree, axis):
     return jnp.moveaxis(basis, 0, -1), jnp.moveaxis(gradient, (0, 1), (-1, -2))
 
 
-def _normalize(vectors: Float[Array, "*batch 3"]) -> tuple[Float[Array, "3 1 n"], Float[Array, "1 n"]]:
+def _normalize(
+    vectors: Float[Array, "*batch 3"],
+) -> tuple[Float[Array, "3 1 n"], Float[Array, "1 n"]]:
     """Unit vectors, components first, and the vectors' lengths."""
     s = vectors.reshape(-1, 3).T[:, None]
     # A length whose square would over- or underflow is none the less a length. The scale cancels,

@@ -29,7 +29,9 @@ def gaunt(degree: int) -> Float[Array, "k k k"]:
 
 
 def product(
-    f: Float[ArrayLike, "*batch_f kf"], g: Float[ArrayLike, "*batch_g kg"], degree: int | None = None
+    f: Float[ArrayLike, "*batch_f kf"],
+    g: Float[ArrayLike, "*batch_g kg"],
+    degree: int | None = None,
 ) -> Float[Array, "*batch k"]:
     """Coefficients of the product f·g, up to `degree` (default: that of the larger input).
 

@@ -91,7 +91,9 @@ def _least_strength(coefficients: Float[Array, " k"], degree: int) -> Float[Arra
     first = np.arange(degree + 1) ** 2  # a window is constant over a band, so bands are enough
     bands = jnp.stack(
         [
-            jnp.matmul(coefficients[i : i + 2 * l + 1], basis[i : i + 2 * l + 1], precision="highest")
+            jnp.matmul(
+                coefficients[i : i + 2 * l + 1], basis[i : i + 2 * l + 1], precision="highest"
+            )
             for l, i in enumerate(first)
         ]
     )

@@ -57,7 +57,9 @@ def convolve(
             f"band, got shape {zonal.shape}"
         )
     lambdas = jnp.multiply(*align(zonal, _unit_lambdas(degree, zonal.dtype)))
-    return jnp.multiply(*align(coefficients, lambdas[..., degrees(degree)].astype(coefficients.dtype)))
+    return jnp.multiply(
+        *align(coefficients, lambdas[..., degrees(degree)].astype(coefficients.dtype))
+    )
 
 
 def _unit_lambdas(degree: int, dtype) -> Float[Array, " bands"]:

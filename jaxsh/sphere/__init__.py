@@ -1,1 +1,17 @@
-"""(being built)"""
+"""The sphere: quadratures, lat-long pictures, and the way from functions to coefficients."""
+
+from ._lat_long import project_lat_long, reconstruct_lat_long
+from ._project import project, reconstruct
+from ._quadrature import Quadrature, cube_map, fibonacci, gauss_legendre, lat_long
+
+__all__ = [
+    "Quadrature",
+    "cube_map",
+    "fibonacci",
+    "gauss_legendre",
+    "lat_long",
+    "project",
+    "project_lat_long",
+    "reconstruct",
+    "reconstruct_lat_long",
+]

@@ -1,0 +1,95 @@
+"""Lat-long pictures: projection and reconstruction that separate into rows and meridians.
+
+y_lm(θ, φ) = P_lm(θ) · cos or sin(|m|φ), so a picture's sums along its rows, one per order, are
+all that its coefficients need: W·H·(2L+1) + H·K multiplications in place of W·H·K.
+"""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ..harmonics import degree_of, degrees, index, legendre, orders
+from ..harmonics._checks import as_float
+from ..harmonics._indexing import check_degree
+from ._quadrature import fejer_weights
+
+
+def project_lat_long(image: Float[ArrayLike, "h w c"], degree: int) -> Float[Array, "c k"]:
+    """Coefficients of a lat-long picture: (H, W, C) -> (C, K).
+
+    Row 0 touches +z, column 0 starts at φ = 0 and φ grows to the right (`docs/conventions.md`).
+    Exact for a picture of a function of degree D where degree + D < H and degree + D < W; the
+    weights are those of `lat_long`. Linear and differentiable.
+
+    Raises `ValueError` for a picture too small for the degree: height and width must be above
+    2·degree.
+    """
+    image, degree = as_float(image), check_degree(degree)
+    if image.ndim != 3:
+        raise ValueError(f"expected a picture (height, width, channels), got shape {image.shape}")
+    height, width, _ = image.shape
+    if min(height, width) <= 2 * degree:
+        raise ValueError(
+            f"a lat-long picture of {height} rows and {width} columns is too small for degree "
+            f"{degree}: both must be above {2 * degree}"
+        )
+    return _project(image, degree)
+
+
+def reconstruct_lat_long(
+    coefficients: Float[ArrayLike, "c k"], height: int, width: int
+) -> Float[Array, "h w c"]:
+    """Lat-long picture of functions, sampled at the pixel centres: (C, K) -> (H, W, C).
+
+    Linear and differentiable. The inverse of `project_lat_long` on large enough pictures.
+    """
+    coefficients = as_float(coefficients)
+    if coefficients.ndim != 2:
+        raise ValueError(f"expected coefficients (channels, K), got shape {coefficients.shape}")
+    if min(height, width) < 1:
+        raise ValueError(f"height and width must be at least 1, got {height} and {width}")
+    return _reconstruct(coefficients, height, width)
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _project(image, degree: int):
+    height, width, _ = image.shape
+    meridians, azimuths = _tables(height, width, degree)
+    weights = fejer_weights(height) * 2 * np.pi / width
+    along_rows = _einsum("hwc,mw->mhc", image, azimuths.astype(image.dtype))
+    padded = _einsum("mhc,mlh->cml", along_rows, (meridians * weights).astype(image.dtype))
+    l, m = degrees(degree), orders(degree)
+    return padded[:, m + degree, l]
+
+
+@functools.partial(jax.jit, static_argnums=(1, 2))
+def _reconstruct(coefficients, height: int, width: int):
+    degree = degree_of(coefficients.shape[-1])
+    meridians, azimuths = _tables(height, width, degree)
+    # A coefficient (l, m) with l < |m| does not exist: whatever is there meets a zero meridian.
+    place = np.array(
+        [[index(max(l, abs(m)), m) for l in range(degree + 1)] for m in range(-degree, degree + 1)]
+    )
+    dtype = coefficients.dtype
+    along_rows = _einsum("cml,mlh->mhc", coefficients[:, place], meridians.astype(dtype))
+    return _einsum("mhc,mw->hwc", along_rows, azimuths.astype(dtype))
+
+
+@functools.lru_cache(maxsize=32)
+def _tables(
+    height: int, width: int, degree: int
+) -> tuple[Float[np.ndarray, "m l h"], Float[np.ndarray, "m w"]]:
+    """P_lm of each row, by order and degree, zero where l < |m|; and cos mφ or sin |m|φ."""
+    theta = (np.arange(height) + 0.5) * np.pi / height
+    phi = (np.arange(width) + 0.5) * 2 * np.pi / width
+    meridians = np.zeros((2 * degree + 1, degree + 1, height))
+    meridians[orders(degree) + degree, degrees(degree)] = legendre(np.cos(theta), degree)
+    m = np.arange(-degree, degree + 1)[:, None]
+    return meridians, np.where(m < 0, np.sin(-m * phi), np.cos(m * phi))
+
+
+def _einsum(subscripts: str, *operands):
+    return jnp.einsum(subscripts, *operands, precision="highest")

@@ -1,0 +1,106 @@
+"""Quadratures of the sphere: directions with weights that sum to 4π."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..harmonics._grid import exact_grid
+
+
+class Quadrature(eqx.Module):
+    """∫ f dω ≈ Σ_n weights_n f(directions_n), with unit directions and positive weights."""
+
+    directions: Float[Array, "n 3"]
+    weights: Float[Array, " n"]
+
+
+def gauss_legendre(degree: int) -> Quadrature:
+    """Exact for polynomials of `degree`: products of harmonics whose degrees sum up to it.
+
+    Gauss–Legendre in cos θ and degree + 1 equal steps in φ, about degree²/2 directions: the
+    fewest of the quadratures here. To project a function of degree L onto degree L take 2L.
+    """
+    grid = exact_grid(_positive("degree", degree, least=0), 0)
+    return _quadrature(grid.directions, grid.weights)
+
+
+def fibonacci(count: int) -> Quadrature:
+    """`count` directions of equal weight along a spiral: even coverage at any number.
+
+    Not exact for any degree. The error falls about as count^-2 for smooth functions and as
+    count^-3/4 for those with edges, where an exact quadrature is no better.
+    """
+    n = np.arange(_positive("count", count))
+    golden = (1 + np.sqrt(5)) / 2
+    z, phi = 1 - (2 * n + 1) / count, 2 * np.pi * n / golden
+    radius = np.sqrt(1 - z**2)
+    directions = np.stack([radius * np.cos(phi), radius * np.sin(phi), z], axis=-1)
+    return _quadrature(directions, np.full(count, 4 * np.pi / count))
+
+
+def cube_map(resolution: int) -> Quadrature:
+    """Texel centres and exact texel solid angles of a cube map, 6·resolution² of them.
+
+    Faces in the order +x, -x, +y, -y, +z, -z, each row by row as OpenGL and Direct3D store them,
+    seen from inside: on -y, which a camera looking ahead with z up meets, rows run down from +z.
+    Exact for functions that are constant on each texel; otherwise the error falls as
+    resolution^-2.
+    """
+    edge = np.linspace(-1, 1, _positive("resolution", resolution) + 1)
+    centre = (edge[1:] + edge[:-1]) / 2
+    # The integral of (1 + u² + v²)^-3/2 over [0, a] × [0, b] is atan(ab/√(1 + a² + b²)).
+    corner = np.arctan2(np.multiply.outer(edge, edge), np.sqrt(1 + np.add.outer(edge**2, edge**2)))
+    solid_angle = corner[1:, 1:] - corner[:-1, 1:] - corner[1:, :-1] + corner[:-1, :-1]
+    v, u = np.meshgrid(centre, centre, indexing="ij")
+    one = np.ones_like(u)
+    faces = [
+        (one, -v, -u),
+        (-one, -v, u),
+        (u, one, v),
+        (u, -one, -v),
+        (u, -v, one),
+        (-u, -v, -one),
+    ]
+    directions = np.stack([np.stack(face, axis=-1) for face in faces]).reshape(-1, 3)
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    return _quadrature(directions, np.tile(solid_angle.ravel(), 6))
+
+
+def lat_long(height: int, width: int) -> Quadrature:
+    """Pixel centres of a lat-long picture, row by row, with weights exact below min(height, width).
+
+    Row i is at θ = (i+½)π/height from +z, column j at φ = (j+½)2π/width from +x. With Fejér's
+    weights the rows integrate polynomials in cos θ exactly. At 256 rows they differ from the
+    pixels' solid angles by 13 % in the row at a pole and by under 2e-4 from the 20th row on.
+    """
+    theta = (np.arange(_positive("height", height)) + 0.5) * np.pi / height
+    phi = (np.arange(_positive("width", width)) + 0.5) * 2 * np.pi / width
+    theta, phi = np.meshgrid(theta, phi, indexing="ij")
+    sin_theta = np.sin(theta)
+    directions = np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta)], -1)
+    weights = np.repeat(fejer_weights(height) * 2 * np.pi / width, width)
+    return _quadrature(directions.reshape(-1, 3), weights)
+
+
+def fejer_weights(height: int) -> Float[np.ndarray, " height"]:
+    """∫ p(cos θ) sin θ dθ = Σ_i w_i p(cos θ_i) at θ_i = (i+½)π/height, for degrees below height.
+
+    Fejér's first rule: the integrals of the cosine series, 2/(1-4k²) for cos 2kθ, transformed
+    back to the nodes. All positive.
+    """
+    theta = (np.arange(height) + 0.5) * np.pi / height
+    k = np.arange(1, (height - 1) // 2 + 1)
+    series = np.cos(2 * np.multiply.outer(theta, k)) / (1 - 4.0 * k**2)
+    return (2 + 4 * series.sum(axis=-1)) / height
+
+
+def _quadrature(directions: np.ndarray, weights: np.ndarray) -> Quadrature:
+    dtype = jnp.result_type(float)
+    return Quadrature(jnp.asarray(directions, dtype), jnp.asarray(weights, dtype))
+
+
+def _positive(name: str, value: int, least: int = 1) -> int:
+    if value < least:
+        raise ValueError(f"{name} must be at least {least}, got {value}")
+    return value
