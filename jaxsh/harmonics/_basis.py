@@ -126,10 +126,14 @@ def _solid_jvp(degree, primals, tangents):
     return basis, sum(along)
 
 
-def _derivative(basis: Float[Array, "k n"], degree: int, axes=slice(None)) -> Float[Array, "..."]:
+def _derivative(
+    basis: Float[Array, "k n"], degree: int, axes: int | slice = slice(None)
+) -> Float[Array, "..."]:
     """∇(r^l y_lm) on the unit sphere, along some or all of x, y, z: (k, n) or (3, k, n)."""
     table = gradient_table(degree)
-    first, second = (t[axes].astype(basis.dtype)[..., None] for t in (table.first, table.second))
+    first, second = (
+        jnp.asarray(t[axes], basis.dtype)[..., None] for t in (table.first, table.second)
+    )
     derivative = first * _take(basis, table.first_row[axes])
     return derivative + second * _take(basis, table.second_row[axes])
 

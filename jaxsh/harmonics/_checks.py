@@ -1,7 +1,7 @@
 """Bad input met early: one sentence that says what was expected and what came."""
 
-import jax
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
 
@@ -17,7 +17,7 @@ def as_float(value: ArrayLike) -> Float[Array, "..."]:
 
 def is_concrete(value: Array) -> bool:
     """True outside of tracing, where a value can be looked at at no cost to compiled code."""
-    return not isinstance(value, jax.core.Tracer)
+    return not isinstance(value, Tracer)
 
 
 def align(*arrays: Array) -> tuple[Array, ...]:

@@ -6,6 +6,7 @@ the basis on the grid (sample, multiply, project) are faster than the tensor at 
 """
 
 import functools
+import math
 
 import jax
 import jax.numpy as jnp
@@ -92,7 +93,7 @@ def _product(f, g, degree: int):
 
     batch = jnp.broadcast_shapes(f.shape[:-1], g.shape[:-1])
     pair = tuple(jnp.broadcast_to(one, (*batch, one.shape[-1])) for one in (f, g))
-    if np.prod(batch) <= _BLOCK:
+    if math.prod(batch) <= _BLOCK:
         return multiply(pair)
     rows = jax.tree.map(lambda one: one.reshape(-1, one.shape[-1]), pair)
     return jax.lax.map(multiply, rows, batch_size=_BLOCK).reshape(*batch, -1)

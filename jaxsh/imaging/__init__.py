@@ -1,1 +1,29 @@
-"""(being built)"""
+"""Pictures in and out: light probes, image files, a camera and what it sees of a mesh.
+
+Everything is linear radiance until `tone_map` makes it fit for a screen; tone curves live here
+and nowhere else. Pictures are (height, width, channels), row 0 on top. What makes a picture from
+numbers differentiates; what touches files or casts rays does not.
+"""
+
+from ._camera import Camera
+from ._compare import psnr
+from ._display import auto_exposure, srgb_decode, srgb_encode, tone_map
+from ._environment import read_environment
+from ._raster import Raster, interpolate, rasterize
+from ._studio import studio
+from ._write import write_image
+
+__all__ = [
+    "Camera",
+    "Raster",
+    "auto_exposure",
+    "interpolate",
+    "psnr",
+    "rasterize",
+    "read_environment",
+    "srgb_decode",
+    "srgb_encode",
+    "studio",
+    "tone_map",
+    "write_image",
+]
