@@ -1,0 +1,76 @@
+"""The mesh, its normals, and the way in for raw arrays."""
+
+import warnings
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array, Float, Int
+
+from ._clean import clean
+
+
+class Mesh(eqx.Module):
+    """A triangle mesh: positions, faces (counter-clockwise seen from outside), unit normals.
+
+    `make_mesh` and `read_mesh` give float32 vertices and normals and int32 faces, with no
+    degenerate face and no vertex that is NaN, infinite, twice there or in no face; a `Mesh` built
+    by hand is taken as it is. Differentiable in vertices and normals; the faces are constants.
+    """
+
+    vertices: Float[Array, "v 3"]
+    faces: Int[Array, "f 3"]
+    normals: Float[Array, "v 3"]
+
+
+def make_mesh(
+    vertices: Float[Array | np.ndarray, "v 3"], faces: Int[Array | np.ndarray, "f 3"]
+) -> Mesh:
+    """A `Mesh` from positions (v, 3) and vertex indices (f, 3), cleaned.
+
+    Faces that touch a NaN or infinite vertex, faces without area (to float32's resolution) and
+    repeated faces are dropped, vertices at exactly the same float32 position merged, and vertices
+    in no face dropped; what stays keeps its order. One `UserWarning` counts what was found.
+
+    Raises `ValueError` where shapes are wrong, an index names no vertex, or no face is left.
+    Not differentiable: move the vertices of the result and call `vertex_normals`.
+    """
+    return build(np.asarray(vertices), np.asarray(faces), source="mesh", corners=False)
+
+
+def build(vertices: np.ndarray, faces: np.ndarray, *, source: str, corners: bool) -> Mesh:
+    """`make_mesh` for a named source; `corners` as in `clean`."""
+    try:
+        vertices, faces, found = clean(vertices, faces, corners=corners)
+    except ValueError as error:
+        raise ValueError(f"{source}: {error}") from None
+    if found:
+        warnings.warn(f"{source}: {', '.join(found)}", UserWarning, stacklevel=3)
+    points, triangles = jnp.asarray(vertices), jnp.asarray(faces)
+    return Mesh(points, triangles, jax.jit(vertex_normals)(points, triangles))
+
+
+def vertex_normals(vertices: Float[Array, "v 3"], faces: Int[Array, "f 3"]) -> Float[Array, "v 3"]:
+    """Unit vertex normals: the mean of the normals of the faces around, weighted by their area.
+
+    Has the dtype of the vertices. Differentiable in the vertices, forward and reverse. Where a
+    vertex's faces cancel, have no area, or there are none, the normal is +z with zero gradient.
+    """
+    # Neither factor changes a direction: without them large or tiny meshes leave float32's range.
+    points = vertices / _largest(vertices)
+    corners = points[faces]
+    areas = jnp.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = jnp.zeros_like(points).at[faces].add(areas[:, None])
+    sums = sums / _largest(sums, axis=-1)
+    squared = jnp.sum(sums * sums, axis=-1, keepdims=True)
+    has_normal = squared > 0
+    unit = sums * lax.rsqrt(jnp.where(has_normal, squared, 1))
+    return jnp.where(has_normal, unit, jnp.zeros_like(unit).at[:, 2].set(1))
+
+
+def _largest(x: Array, axis: int | None = None) -> Array:
+    """The largest magnitude, as a constant to divide by; 1 where everything is zero."""
+    largest = lax.stop_gradient(jnp.max(jnp.abs(x), axis=axis, keepdims=True, initial=0))
+    return jnp.where(largest > 0, largest, 1)

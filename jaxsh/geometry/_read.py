@@ -1,0 +1,152 @@
+"""Mesh files: parsed by trimesh, and checked against what they say they hold."""
+
+import io
+import os
+import re
+import warnings
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ._mesh import Mesh, build
+
+_FORMATS = (".ply", ".obj", ".off", ".stl", ".glb")
+# What trimesh need not look at. Textures would make it split and reorder vertices.
+_OPTIONS: dict[str, dict[str, Any]] = {
+    ".ply": {"fix_texture": False, "skip_materials": True},
+    ".obj": {"maintain_order": True, "skip_materials": True},
+    ".glb": {"skip_materials": True},
+}
+
+
+def read_mesh(path: str | os.PathLike[str], *, up: Literal["z", "y"] = "z") -> Mesh:
+    """Read a PLY, OBJ, OFF, STL or GLB file into one `Mesh`.
+
+    Several objects become one mesh, each where its scene puts it; polygons become triangles.
+    `up` names the axis that points up in the file: "z" takes positions as they are, "y" turns
+    them by 90° about x, so that y becomes z (glTF is y-up by its specification, and nothing is
+    turned unless asked). Cleaned as in `make_mesh`, with one `UserWarning` that counts what was
+    dropped; merging the corners that STL and GLB store apart is no fault and not counted.
+
+    Raises `FileNotFoundError` for a missing file, and `ValueError`, naming the file and the
+    problem, for an unknown extension, a damaged or truncated file, and one without faces. An OBJ
+    file does not say how much it holds: cut off between two lines it cannot be told from a whole.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in _FORMATS:
+        raise ValueError(f"{path}: cannot read {suffix or 'no extension'}, only {_FORMATS}")
+    if up not in ("z", "y"):
+        raise ValueError(f'up must be "z" or "y", got {up!r}')
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: there is no such mesh file")
+    data = path.read_bytes()
+    try:
+        if suffix == ".obj":
+            data = _plain_obj(data)
+        announced = _announced(data, suffix)
+        vertices, faces = _parse(data, suffix)
+        # Each polygon gives at least one triangle.
+        if announced and (len(vertices) != announced[0] or len(faces) < announced[1]):
+            raise ValueError(
+                f"it announces {announced[0]} vertices and {announced[1]} faces, "
+                f"but {len(vertices)} vertices and {len(faces)} triangles could be read"
+            )
+    except ImportError:
+        raise
+    except Exception as error:  # a parser may raise anything when a file is damaged
+        reason = str(error).strip().split("\n")[0]
+        raise ValueError(f"{path}: damaged or not a {suffix} file: {reason}") from error
+    if up == "y":
+        vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1)
+    return build(vertices, faces, source=str(path), corners=suffix in (".stl", ".glb"))
+
+
+def _parse(data: bytes, suffix: str) -> tuple[np.ndarray, np.ndarray]:
+    import trimesh
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        # NumPy only warns when text stops making sense, and gives what it had read so far.
+        warnings.filterwarnings("error", message=".*could not be read to its end")
+        loaded = trimesh.load(
+            io.BytesIO(data), file_type=suffix[1:], process=False, **_OPTIONS.get(suffix, {})
+        )
+        parts = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
+    meshes = [part for part in parts if isinstance(part, trimesh.Trimesh)]
+    if not meshes:
+        raise ValueError("it holds no faces")
+    offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    faces = [np.asarray(mesh.faces) + offset for mesh, offset in zip(meshes, offsets, strict=False)]
+    return np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces)
+
+
+def _plain_obj(data: bytes) -> bytes:
+    """Only positions and faces, absolutely indexed: trimesh splits vertices at texture seams."""
+    text = data.decode("utf-8", errors="replace").replace("\\\n", " ").replace("\\\r\n", " ")
+    lines, count = [], 0
+    for number, line in enumerate(text.splitlines(), start=1):
+        key, *words = line.split("#")[0].split() or [""]
+        if key not in ("v", "f"):
+            continue
+        if len(words) < 3:
+            raise ValueError(f"line {number} has {len(words)} values after {key!r}")
+        if key == "v":
+            count += 1
+            words = words[:3]
+        else:
+            indices = [int(word.split("/")[0]) for word in words]
+            # Negative ones count back from the last vertex so far.
+            indices = [i + count + 1 if i < 0 else i for i in indices]
+            if min(indices) < 1:
+                raise ValueError(f"line {number} names vertex {words[indices.index(min(indices))]}")
+            words = map(str, indices)
+        lines.append(" ".join([key, *words]))
+    return "\n".join(lines).encode()
+
+
+def _announced(data: bytes, suffix: str) -> tuple[int, int] | None:
+    """Numbers of vertices and faces that a file says it holds: parsers take less for an answer.
+
+    None for glTF, whose parser checks the length of every chunk. Raises `ValueError` where the
+    file is plainly too short.
+    """
+    if not data.strip():
+        raise ValueError("it is empty")
+    match suffix:
+        case ".obj":
+            return len(re.findall(rb"^v ", data, re.M)), len(re.findall(rb"^f ", data, re.M))
+        case ".stl":
+            facets = int.from_bytes(data[80:84], "little")
+            if len(data) != 84 + 50 * facets:  # not binary
+                facets = len(re.findall(rb"outer\s+loop", data.lower()))
+                if facets == 0:
+                    raise ValueError("it is neither text nor as long as its number of facets")
+                if b"endsolid" not in data.lower():
+                    raise ValueError("it breaks off before endsolid")
+            return 3 * facets, facets
+        case ".off":
+            lines = [line.split(b"#")[0].split() for line in data.splitlines()]
+            lines = [[word for word in line if not word.endswith(b"OFF")] for line in lines]
+            lines = [line for line in lines if line]
+            vertices, faces = map(int, lines[0][:2])
+            _check_lines(len(lines), vertices + faces + 1)
+            return vertices, faces
+        case ".ply":
+            header, end, body = data.partition(b"end_header")
+            elements = dict(re.findall(rb"element\s+(\w+)\s+(\d+)", header))
+            if not end or b"vertex" not in elements:
+                raise ValueError("its header is not whole")
+            if re.search(rb"format\s+ascii", header):
+                _check_lines(
+                    sum(map(bool, map(bytes.split, body.splitlines()))),
+                    sum(map(int, elements.values())),
+                )
+            return int(elements[b"vertex"]), int(elements.get(b"face", 0))
+    return None
+
+
+def _check_lines(found: int, announced: int) -> None:
+    if found < announced:
+        raise ValueError(f"it announces {announced} lines of data, but has {found}")

@@ -1,0 +1,128 @@
+"""A pinhole camera."""
+
+import math
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Float
+
+from jaxsh.geometry import Mesh
+
+
+def _point(x: Any) -> Array:
+    x = jnp.asarray(x)
+    return x if jnp.issubdtype(x.dtype, jnp.floating) else x.astype(jnp.float32)
+
+
+class Camera(eqx.Module):
+    """A pinhole at `position` that looks at `target`, with `up` upwards in the picture.
+
+    `fov_y` is the whole vertical angle of view in degrees; pixels are square. Vectors may be
+    given as tuples. Raises `ValueError` for a picture without pixels, an angle outside (0, 180),
+    and, where values are concrete, a view direction that is zero or along `up`.
+    """
+
+    position: Float[Array, " 3"] = eqx.field(converter=_point)
+    target: Float[Array, " 3"] = eqx.field(converter=_point)
+    up: Float[Array, " 3"] = eqx.field(converter=_point, default=(0.0, 0.0, 1.0))
+    fov_y: float | Float[Array, ""] = 40.0
+    width: int = eqx.field(static=True, default=512)
+    height: int = eqx.field(static=True, default=512)
+
+    def __check_init__(self):
+        if self.width < 1 or self.height < 1:
+            raise ValueError(f"a picture needs pixels, got {self.width} × {self.height}")
+        values = (self.position, self.target, self.up, self.fov_y)
+        if any(isinstance(value, Tracer) for value in values):
+            return
+        if not 0 < self.fov_y < 180:
+            raise ValueError(f"fov_y must be between 0 and 180 degrees, got {self.fov_y}")
+        forward = np.subtract(self.target, self.position, dtype=np.float64)
+        up = np.asarray(self.up, np.float64)
+        # Written so that NaN is refused too.
+        if not (
+            np.linalg.norm(np.cross(forward, up))
+            > 1e-6 * np.linalg.norm(forward) * np.linalg.norm(up)
+        ):
+            raise ValueError(
+                "target must differ from position, and up must not be along the view: "
+                f"position {self.position}, target {self.target}, up {self.up}"
+            )
+
+    @classmethod
+    def facing(
+        cls,
+        mesh: Mesh,
+        *,
+        toward: tuple[float, float, float] = (0.0, -1.0, 0.2),
+        fov_y: float = 30.0,
+        width: int = 512,
+        height: int = 512,
+        margin: float = 0.05,
+    ) -> "Camera":
+        """The camera that sees `mesh` from the direction `toward`, as large as fits the picture.
+
+        `toward` points from the mesh to the camera (default: from its front, -y, and a little
+        above). `margin` is the share of the picture's half width or height left free around it.
+        """
+        aim = cls(position=toward, target=(0, 0, 0), fov_y=fov_y, width=width, height=height)
+        right, upward, forward = np.asarray(aim._axes(), np.float64)
+        x, y, z = (
+            np.asarray(mesh.vertices, np.float64) @ axis for axis in (right, upward, forward)
+        )
+        # Seen from (cx, cy, cz) along z, a vertex is inside where |x - cx| ≤ tan_x (z - cz): the
+        # camera is as far forward as the tighter of the two pairs of planes allows.
+        tan_y = math.tan(math.radians(fov_y) / 2) * (1 - margin)
+        cz = min(
+            -(np.max(a - tan * z) + np.max(-a - tan * z)) / (2 * tan)
+            for a, tan in ((x, tan_y * width / height), (y, tan_y))
+        )
+        cx, cy = (_centre(a, z - cz) for a in (x, y))
+        position = cx * right + cy * upward + cz * forward
+        return cls(
+            position=position.astype(np.float32),
+            target=(position + (np.mean(z) - cz) * forward).astype(np.float32),
+            fov_y=fov_y,
+            width=width,
+            height=height,
+        )
+
+    def rays(self) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
+        """Origins and unit directions through the pixel centres: row by row from the top left.
+
+        n is height · width; dtype that of `position`. Differentiable in every field that is not
+        a size.
+        """
+        right, upward, forward = self._axes()
+        dtype = self.position.dtype
+        tan_y = jnp.tan(jnp.radians(jnp.asarray(self.fov_y, dtype)) / 2)
+        columns = (2 * jnp.arange(self.width, dtype=dtype) + 1) / self.width - 1
+        rows = 1 - (2 * jnp.arange(self.height, dtype=dtype) + 1) / self.height
+        x, y = jnp.meshgrid(columns * tan_y * (self.width / self.height), rows * tan_y)
+        directions = _unit(
+            x.reshape(-1, 1) * right[None] + y.reshape(-1, 1) * upward[None] + forward[None]
+        )
+        return jnp.broadcast_to(self.position[None], directions.shape), directions
+
+    def _axes(self) -> tuple[Array, Array, Array]:
+        """Unit vectors to the right, upwards and forward in the picture."""
+        forward = _unit(self.target.astype(self.position.dtype) - self.position)
+        right = _unit(jnp.cross(forward, self.up.astype(forward.dtype)))
+        return right, jnp.cross(right, forward), forward
+
+
+def _unit(x: Array) -> Array:
+    return x / jnp.linalg.norm(x, axis=-1, keepdims=True)
+
+
+def _centre(x: np.ndarray, depth: np.ndarray) -> float:
+    """The c from which the outermost (x - c) / depth to both sides are equally far out."""
+    c = 0.0
+    for _ in range(16):  # finds the two outermost in a few steps, then stays
+        out = (x - c) / depth
+        i, j = out.argmax(), out.argmin()
+        c = (x[i] * depth[j] + x[j] * depth[i]) / (depth[i] + depth[j])
+    return c

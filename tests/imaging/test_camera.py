@@ -1,0 +1,203 @@
+"""The camera, what it sees, and colours from vertices to pixels."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.test_util import check_grads
+
+from jaxsh.geometry import Mesh, knot, make_mesh
+from jaxsh.imaging import Camera, interpolate, rasterize
+
+
+@pytest.fixture
+def sheet():
+    """A square in the plane y = 0 that faces -y, split into cells, so that it is no mere quad."""
+    x, z = np.meshgrid(np.linspace(-1, 1, 6), np.linspace(-1, 1, 5))
+    vertices = np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
+    a = (np.arange(4)[:, None] * 6 + np.arange(5)).reshape(-1)
+    return make_mesh(
+        vertices,
+        np.concatenate([np.stack([a, a + 1, a + 7], 1), np.stack([a, a + 7, a + 6], 1)]),
+    )
+
+
+def test_rays_run_row_by_row_from_the_top_left():
+    camera = Camera(position=(0, -2, 0), target=(0, 0, 0), fov_y=90.0, width=4, height=2)
+    origins, directions = camera.rays()
+    assert origins.shape == directions.shape == (8, 3)
+    np.testing.assert_array_equal(origins, np.tile([0, -2, 0], (8, 1)))
+    # At distance 1 the picture is 2 high and 4 wide; +x is to the right, +z up.
+    expected = [(x, 1, z) for z in (0.5, -0.5) for x in (-1.5, -0.5, 0.5, 1.5)]
+    np.testing.assert_allclose(directions / directions[:, 1:2], expected, atol=1e-6)
+    np.testing.assert_allclose(jnp.linalg.norm(directions, axis=1), 1, rtol=1e-6)
+
+
+def test_up_turns_the_picture():
+    camera = Camera((0.0, -2.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 90.0, 2, 2)
+    np.testing.assert_allclose(
+        camera.rays()[1] * np.sqrt(1.5),
+        np.array([[1, 2, 1], [1, 2, -1], [-1, 2, 1], [-1, 2, -1]]) / 2,
+        atol=1e-15,
+    )
+
+
+@pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
+def test_rays_keep_dtype_and_differentiate(dtype):
+    def rays(position, fov_y):
+        camera = Camera(position, jnp.zeros(3), jnp.array([0.1, 0, 1]), fov_y, width=3, height=2)
+        return camera.rays()
+
+    position, angle = jnp.array([1, -2, 0.5], dtype), jnp.asarray(35, dtype)
+    plain, compiled = rays(position, angle), jax.jit(rays)(position, angle)
+    for a, b in zip(plain, compiled, strict=True):
+        assert a.dtype == b.dtype == dtype
+        np.testing.assert_allclose(a, b, atol=4 * float(jnp.finfo(dtype).eps))
+    batch = jax.jit(jax.vmap(rays, (0, None)))(jnp.stack([position, 2 * position]), angle)
+    np.testing.assert_allclose(batch[1][0], plain[1], atol=4 * float(jnp.finfo(dtype).eps))
+    if dtype == jnp.float64:
+        check_grads(
+            jax.jit(rays),
+            (position, angle),
+            1,
+            ("fwd", "rev"),
+            atol=1e-7,
+            rtol=1e-7,
+        )
+
+
+def test_camera_passes_through_jit():
+    camera = Camera((0.0, -2.0, 0.0), (0.0, 0.0, 0.0), width=3, height=2)
+    directions = jax.jit(lambda c: c.rays()[1])(camera)
+    np.testing.assert_allclose(directions, camera.rays()[1], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"width": 0}, "needs pixels, got 0 × 512"),
+        ({"fov_y": 180.0}, "between 0 and 180 degrees, got 180"),
+        ({"fov_y": float("nan")}, "between 0 and 180 degrees, got nan"),
+        ({"target": (0.0, -2.0, 0.0)}, "target must differ from position"),
+        ({"target": (0.0, -2.0, 5.0)}, "up must not be along the view"),
+        ({"up": (0.0, 0.0, 0.0)}, "up must not be along the view"),
+        ({"up": (0.0, 0.0, np.nan)}, "up must not be along the view"),
+    ],
+)
+def test_bad_cameras_are_refused(fields, message):
+    with pytest.raises(ValueError, match=message):
+        Camera(**{"position": (0.0, -2.0, 0.0), "target": (0.0, 0.0, 0.0), **fields})
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "toward"),
+    [(60, 60, (0.0, -1.0, 0.2)), (90, 45, (1.0, 1.0, 1.0)), (40, 80, (-2.0, 0.0, -1.0))],
+)
+def test_facing_fills_the_picture(width, height, toward):
+    mesh = knot(2000)
+    moved = Mesh(mesh.vertices * 3 + jnp.array([[5, -2, 9]], jnp.float32), mesh.faces, mesh.normals)
+    camera = Camera.facing(moved, toward=toward, width=width, height=height, margin=0.0)
+    raster = rasterize(moved, camera)
+    rows, columns = np.nonzero(raster.mask)
+    first, last = (rows.min(), columns.min()), (rows.max(), columns.max())
+    # One of the two directions is filled to the last pixel but one, the other is centred.
+    free = np.array([first, (height - 1 - last[0], width - 1 - last[1])])
+    assert free.sum(axis=0).min() <= 2
+    assert np.abs(free[0] - free[1]).max() <= 2
+    view = np.asarray(camera.position - camera.target)
+    np.testing.assert_allclose(
+        view / np.linalg.norm(view), toward / np.linalg.norm(toward), atol=1e-5
+    )
+
+
+def test_facing_leaves_a_margin():
+    mesh = knot(2000)
+    camera = Camera.facing(mesh, width=100, height=100, margin=0.2)
+    rows, columns = np.nonzero(rasterize(mesh, camera).mask)
+    assert min(rows.min(), columns.min(), 99 - rows.max(), 99 - columns.max()) in (9, 10, 11)
+
+
+def test_a_viewer_in_front_sees_the_front(sheet):
+    """From -y: x to the right, z up, and a face that faces -y shows its front."""
+    camera = Camera.facing(sheet, toward=(0.0, -1.0, 0.0), width=20, height=20)
+    raster = rasterize(sheet, camera)
+    place = interpolate(raster, sheet.faces, sheet.vertices)
+    assert float(place[10, 18, 0]) > 0.8
+    assert float(place[10, 1, 0]) < -0.8
+    assert float(place[1, 10, 2]) > 0.8
+    normal = interpolate(raster, sheet.faces, sheet.normals)
+    np.testing.assert_allclose(normal[10, 10], [0, -1, 0], atol=1e-6)
+
+
+def test_the_silhouette_of_a_sphere_is_the_projected_disc():
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=5)
+    mesh = make_mesh(ball.vertices, ball.faces)
+    camera = Camera(position=(0.0, -4.0, 0.0), target=(0.0, 0.0, 0.0), width=200, height=150)
+    raster = rasterize(mesh, camera)
+    directions = np.asarray(camera.rays()[1]).reshape(150, 200, 3)
+    # A ray meets the unit ball at distance 4 within asin(1/4) of the axis; the mesh lies inside
+    # the ball by up to 6e-4, which 1e-3 covers.
+    sine = np.linalg.norm(directions[..., [0, 2]], axis=-1)
+    clear = np.abs(sine - 0.25) > 1e-3
+    assert clear.mean() > 0.98
+    np.testing.assert_array_equal(np.asarray(raster.mask)[clear], (sine < 0.25)[clear])
+    # Where it is seen, the surface is that of the sphere, and its normal the place.
+    place = interpolate(raster, mesh.faces, mesh.vertices)[raster.mask]
+    np.testing.assert_allclose(jnp.linalg.norm(place, axis=-1), 1, atol=1e-3)
+    assert place[:, 1].max() < -0.2
+
+
+def test_raster_has_its_shapes_and_marks(sheet):
+    raster = rasterize(sheet, Camera((0, -9, 0), (0, 0, 0), width=30, height=20))
+    assert raster.face.shape == raster.mask.shape == (20, 30)
+    assert raster.face.dtype == jnp.int32
+    assert raster.barycentric.dtype == jnp.float32
+    assert 0.05 < raster.mask.mean() < 0.95
+    np.testing.assert_allclose(raster.barycentric.sum(-1), raster.mask, atol=1e-6)
+    assert (raster.face[~np.asarray(raster.mask)] == -1).all()
+
+
+def test_interpolation_is_exact_on_linear_functions_of_place(sheet):
+    """Also under perspective: the sheet is seen at a slant."""
+    camera = Camera((1.5, -2.0, 0.7), (0.0, 0.0, 0.0), fov_y=50.0, width=40, height=30)
+    raster = rasterize(sheet, camera)
+    matrix, shift = jnp.array([[1.0, 2, -1], [0.5, 0, 3]]), jnp.array([0.2, -0.3])
+    vertices = sheet.vertices.astype(jnp.float64)
+    image = interpolate(raster, sheet.faces, vertices @ matrix.T + shift[None])
+    # The place that a pixel sees, from its ray and the plane y = 0 alone.
+    origins, directions = (np.asarray(rays) for rays in camera.rays())
+    place = origins - directions * (origins[:, 1:2] / directions[:, 1:2])
+    expected = (place @ np.asarray(matrix).T + np.asarray(shift)).reshape(30, 40, 2)
+    mask = np.asarray(raster.mask)
+    assert 0.1 < mask.mean() < 0.9
+    # Embree's float32: 1.5e-6 measured.
+    np.testing.assert_allclose(image[mask], expected[mask], atol=5e-6)
+    assert (image[~mask] == 0).all()
+
+
+@pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
+def test_interpolation_compiles_batches_and_differentiates(sheet, rng, dtype):
+    raster = rasterize(sheet, Camera((0, -4, 0), (0, 0, 0), width=8, height=6))
+    batch = jnp.asarray(rng.normal(size=(2, len(sheet.vertices), 3)), dtype)
+    behind = jnp.array([1.0, 2, 3], dtype)
+
+    def draw(values, background):
+        return interpolate(raster, sheet.faces, values, background)
+
+    images = jax.jit(jax.vmap(draw, (0, None)))(batch, behind)
+    assert images.dtype == dtype
+    np.testing.assert_allclose(images[1], draw(batch[1], behind), atol=1e-6)
+    np.testing.assert_array_equal(images[0][~raster.mask][0], behind)
+    # Linear in the values: the Jacobian is the function, and its transpose collects each weight.
+    forward, reverse = (jax.jit(jac(draw))(batch[0], behind) for jac in (jax.jacfwd, jax.jacrev))
+    np.testing.assert_allclose(forward, reverse, atol=1e-7)
+    np.testing.assert_allclose(
+        jnp.einsum("hwcvk,vk->hwc", forward, batch[0])[raster.mask],
+        images[0][raster.mask],
+        atol=1e-6,
+    )
+    gradient = jax.grad(lambda v: draw(v, behind).sum())(batch[0])
+    np.testing.assert_allclose(gradient.sum(), 3 * int(raster.mask.sum()), rtol=1e-6)
+    assert jax.grad(lambda b: draw(batch[0], b).sum())(behind)[0] == int((~raster.mask).sum())

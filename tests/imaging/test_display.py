@@ -1,0 +1,118 @@
+"""Tone curve, exposure, and the measure of difference."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.test_util import check_grads
+
+from jaxsh.imaging import auto_exposure, psnr, srgb_decode, srgb_encode, tone_map
+
+DTYPES = pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
+
+
+def test_known_values_of_the_curve():
+    # Middle grey of 18 % is 117.6 of 255, half the signal is 21.4 % of the light (IEC 61966-2-1).
+    linear = jnp.array([0.0, 0.0031308, 0.18, 0.21404114048223255, 0.5, 1.0])
+    signal = [0.0, 0.040449936, 0.46135612950044164, 0.5, 0.7353569830524495, 1.0]
+    np.testing.assert_allclose(srgb_encode(linear), signal, atol=1e-14)
+    np.testing.assert_allclose(srgb_decode(jnp.asarray(signal)), linear, atol=1e-14)
+
+
+@DTYPES
+def test_decode_inverts_encode(dtype):
+    linear = jnp.linspace(-0.5, 4, 10_001, dtype=dtype)
+    back = srgb_decode(srgb_encode(linear))
+    assert back.dtype == dtype
+    # At 0.0031308 the standard's two parts miss each other by 3e-8 of signal.
+    tolerance = 1e-6 if dtype == jnp.float32 else 3e-9
+    np.testing.assert_allclose(back, linear, atol=tolerance, rtol=tolerance)
+
+
+@pytest.mark.parametrize("f", [srgb_encode, srgb_decode])
+def test_curve_rises_and_its_gradient_is_finite(f):
+    x = jnp.concatenate([jnp.linspace(-10, 10, 2001), jnp.array([0.0031308, 0.04045, 1e-300])])
+    forward = jax.jvp(f, (x,), (jnp.ones_like(x),))[1]
+    reverse = jax.vjp(f, x)[1](jnp.ones_like(x))[0]
+    np.testing.assert_allclose(forward, reverse, rtol=1e-14)
+    assert np.isfinite(forward).all()
+    assert (forward > 0).all()
+
+
+@pytest.mark.parametrize("x", [-1.0, 0.0, 1e-30, 0.0031308, 0.5, 1.0, 5.0, 1e30])
+def test_tone_map_has_a_finite_gradient(x):
+    for dtype in (jnp.float32, jnp.float64):
+        value, slope = jax.value_and_grad(tone_map)(jnp.asarray(x, dtype), jnp.asarray(1, dtype))
+        assert value.dtype == slope.dtype == dtype
+        assert 0 <= value <= 1
+        assert np.isfinite(slope)
+
+
+def test_tone_map_exposes_then_clips_then_encodes(rng):
+    image = jnp.asarray(rng.uniform(-0.2, 2, size=(4, 5, 3)))
+    expected = srgb_encode(jnp.clip(image * 0.7, 0, 1))
+    np.testing.assert_array_equal(tone_map(image, 0.7), expected)
+    compiled = jax.jit(jax.vmap(tone_map, (0, None)))(image, jnp.asarray(0.7, jnp.float32))
+    np.testing.assert_allclose(compiled, expected, atol=1e-7)  # 0.7 came as float32
+    inside = jnp.asarray(rng.uniform(0.1, 0.9, size=(2, 2, 3)))
+    check_grads(
+        jax.jit(tone_map),
+        (inside, jnp.asarray(0.7)),
+        1,
+        ("fwd", "rev"),
+        atol=1e-7,
+        rtol=1e-7,
+    )
+
+
+@DTYPES
+def test_auto_exposure_takes_the_percentile_of_the_object_to_one(rng, dtype):
+    image = jnp.asarray(rng.uniform(0, 3, size=(30, 40, 3)), dtype)
+    mask = jnp.asarray(rng.uniform(size=(30, 40)) < 0.3)
+    scale = jax.jit(auto_exposure)(image, mask)
+    assert scale.dtype == dtype
+    brightest = np.asarray(image).max(axis=-1)[np.asarray(mask)]
+    np.testing.assert_allclose(scale, 1 / np.percentile(brightest, 99), rtol=1e-6)
+    np.testing.assert_allclose(auto_exposure(image, percentile=100.0), 1 / image.max(), rtol=1e-6)
+    assert np.isfinite(jax.grad(auto_exposure)(image, mask)).all()
+
+
+def test_auto_exposure_of_nothing_is_one():
+    black = jnp.zeros((3, 3, 3))
+    assert auto_exposure(black) == 1
+    assert auto_exposure(black + 5, jnp.zeros((3, 3), bool)) == 1
+    assert np.isfinite(jax.grad(auto_exposure)(black)).all()
+    with pytest.raises(ValueError, match="between 0 and 100, got 101"):
+        auto_exposure(black, percentile=101.0)
+
+
+@DTYPES
+def test_psnr_of_known_errors(dtype):
+    reference = jnp.full((4, 6, 3), 0.5, dtype)
+    assert psnr(reference, reference).dtype == dtype
+    assert psnr(reference, reference) == jnp.inf
+    np.testing.assert_allclose(psnr(reference + 0.1, reference), 20, rtol=1e-5)
+    np.testing.assert_allclose(psnr(reference + 0.1, reference, peak=10.0), 40, rtol=1e-5)
+    # One channel of one pixel in eight: a twenty-fourth of the square.
+    spot = reference.at[1, 1, 0].add(0.1)
+    mask = jnp.zeros((4, 6), bool).at[1, :].set(True).at[2, :2].set(True)
+    np.testing.assert_allclose(psnr(spot, reference, mask), 20 + 10 * np.log10(24), rtol=1e-5)
+    assert psnr(spot, reference, ~mask) == jnp.inf
+    assert jnp.isnan(psnr(spot, reference, mask & False))
+
+
+def test_psnr_differentiates_compiles_and_batches(rng):
+    image, reference = jnp.asarray(rng.uniform(size=(2, 4, 5, 3)))
+    mask = jnp.asarray(rng.uniform(size=(4, 5)) < 0.5)
+    check_grads(
+        jax.jit(lambda a, b: psnr(a, b, mask)),
+        (image, reference),
+        1,
+        ("fwd", "rev"),
+        atol=1e-5,
+        rtol=1e-5,
+    )
+    batch = jax.jit(jax.vmap(psnr, (0, None, None)))(jnp.stack([image, reference]), reference, mask)
+    np.testing.assert_allclose(batch, [float(psnr(image, reference, mask)), np.inf], rtol=1e-14)
+    np.testing.assert_array_equal(jax.grad(psnr)(image, image, mask), 0)
+    assert (jax.grad(psnr)(image, reference, mask)[~mask] == 0).all()
