@@ -1,0 +1,1 @@
+"""jaxsh beside its peers, measured interleaved in one run: ``python -m benchmarks``."""

@@ -1,0 +1,140 @@
+"""``python -m benchmarks [options]``: writes ``results/benchmarks/report.md`` and ``rows.json``."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal
+
+import tyro
+from tqdm import tqdm
+
+from experiments import Column, Table
+from experiments._machine import describe
+from experiments._report import to_json, to_markdown, write
+
+_BASIS = [
+    Column("quantity", "quantity"),
+    Column("dtype", "dtype"),
+    Column("degree", "degree"),
+    Column("count", "N"),
+    Column("cores", "cores"),
+    Column("ours_ms", "ours, ms", digits=2),
+    Column("over_floor", "ours / write floor", digits=1),
+    Column("sphericart", "sphericart / ours", digits=2),
+    Column("solid", "its solid harmonics / ours", digits=2),
+    Column("e3nn", "e3nn / ours", digits=1),
+    Column("scipy", "SciPy / ours", digits=0),
+    Column("compile_s", "first call, s", digits=2),
+]
+_LAT_LONG = [
+    Column("quantity", "quantity"),
+    Column("picture", "picture"),
+    Column("degree", "degree"),
+    Column("cores", "cores"),
+    Column("ours_ms", "separable, ms", digits=2),
+    Column("streamed", "streamed / separable", digits=1),
+    Column("sphericart", "sphericart + matmul / separable", digits=1),
+    Column("compile_s", "first call, s", digits=2),
+]
+_ERRORS = [
+    Column("degree", "degree"),
+    Column("ours", "ours"),
+    Column("sphericart", "sphericart"),
+    Column("e3nn", "e3nn"),
+]
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """jaxsh beside its peers, each table interleaved in one process."""
+
+    degrees: tuple[int, ...] = (3, 6, 10, 13)
+    """degrees of the basis"""
+    counts: tuple[int, ...] = (10_000, 100_000)
+    """numbers of directions"""
+    dtypes: tuple[Literal["float32", "float64"], ...] = ("float32", "float64")
+    """precisions of the basis"""
+    cores: tuple[Literal["one", "all"], ...] = ("one", "all")
+    """one: CPU time, pinned to a core; all: wall clock"""
+    error_degrees: tuple[int, ...] = (6, 10, 13, 20, 30)
+    """degrees of the table of float32 errors"""
+    rounds: int = 15
+    """interleaved rounds per row"""
+    out: Path = Path("results/benchmarks")
+    """where the report goes"""
+
+
+def run(options: Options) -> Path:
+    """Measure, and return the report's path."""
+    tables: dict[str, list[dict[str, Any]]] = {"basis": [], "lat_long": [], "errors": []}
+    options.out.mkdir(parents=True, exist_ok=True)
+    progress = tqdm(list(_requests(options)), "benchmarks", file=sys.stderr)
+    for request in progress:
+        progress.set_postfix_str(f"{request['table']}, {request['dtype']}, {request['cores']}")
+        for row in _measure(request):
+            tables[request["table"]].append(row)
+            write(options.out / "rows.json", to_json(tables))
+    machine = describe()
+    versions = _versions()
+    facts = [
+        f"{machine['cpu']['model']}, {machine['cpu']['count']} cores",
+        *(f"{name} {version}" for name, version in versions.items()),
+        f"commit {(machine['commit'] or 'none')[:10]}{', changed' if machine['dirty'] else ''}",
+    ]
+    layout = (
+        "Ratios above 1: ours is faster. Ours with `axis=0`. Medians over interleaved rounds, each "
+        "the fastest of three calls, so that large fresh outputs (the default allocator maps 32 MB "
+        "and more anew at every call) cost all rivals the same page faults."
+    )
+    report = [
+        "# Benchmarks\n",
+        to_markdown(Table("Basis", _BASIS, note=layout), tables["basis"]),
+        to_markdown(Table("Lat-long pictures, float32", _LAT_LONG), tables["lat_long"]),
+        to_markdown(Table("Largest float32 error", _ERRORS), tables["errors"]),
+        f"```\npython -m benchmarks {' '.join(sys.argv[1:])}".rstrip() + "\n```\n",
+        f"<sub>{' · '.join(facts)}</sub>\n",
+    ]
+    write(options.out / "report.md", "\n".join(report))
+    return options.out / "report.md"
+
+
+def _requests(options: Options) -> Iterator[dict[str, Any]]:
+    common = {"rounds": options.rounds}
+    for cores in options.cores:
+        for dtype in options.dtypes:
+            yield common | {
+                "table": "basis",
+                "cores": cores,
+                "dtype": dtype,
+                "degrees": options.degrees,
+                "counts": options.counts,
+            }
+        yield common | {"table": "lat_long", "cores": cores, "dtype": "float32", "degrees": [10]}
+    yield common | {
+        "table": "errors",
+        "cores": "all",
+        "dtype": "float32",
+        "degrees": options.error_degrees,
+    }
+
+
+def _measure(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    command = [sys.executable, "-m", "benchmarks._child", json.dumps(request)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        yield from map(json.loads, child.stdout)
+    if child.returncode:
+        raise SystemExit(f"the measurement {request} failed; see above")
+
+
+def _versions() -> dict[str, str]:
+    from importlib.metadata import version
+
+    return {name: version(name) for name in ("jax", "sphericart-jax", "e3nn-jax", "scipy")}
+
+
+if __name__ == "__main__":
+    print(run(tyro.cli(Options, prog="python -m benchmarks")))
