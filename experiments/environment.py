@@ -108,7 +108,7 @@ def run(config: Environment, context: Context) -> list[Table]:
                 context.record(row)
                 if window == "none":
                     shots.append(Shot(degree, light, image))
-        caption = f"{name}: the light at each degree and what it makes of the mesh"
+        caption = f"{name}: the light at each degree, blue where it is negative; render; error"
         _draw(context.path(f"{name}.png", caption), environment, reference, shots, exposure, view)
         sheet.append((name, environment, reference, exposure))
     path = context.path("environments.png", "the reference under each environment")
@@ -253,7 +253,8 @@ def _draw(path, environment, reference, shots, exposure, view: View) -> None:
         error = axes[2, column].imshow(difference, cmap="RdBu_r", vmin=-10, vmax=10)
     for axis in axes.flat:
         axis.axis("off")
-    figure.colorbar(error, ax=axes[2, 0], label="error, % of white", location="right", shrink=0.8)
+    scale = axes[2, 0].inset_axes((0.8, 0.1, 0.06, 0.8))
+    figure.colorbar(error, cax=scale, label="error, % of white", ticklocation="left")
     figure.savefig(path, dpi=100)
     plt.close(figure)
 

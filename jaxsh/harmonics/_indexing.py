@@ -37,14 +37,15 @@ def index(l: int, m: int) -> int:
 
 def degrees(degree: int) -> Int[np.ndarray, " k"]:
     """Degree l of each of the K coefficients: 0, 1, 1, 1, 2, …"""
-    ls = np.arange(check_degree(degree) + 1)
+    # int32, as an index and as a factor the same with and without x64.
+    ls = np.arange(check_degree(degree) + 1, dtype=np.int32)
     return np.repeat(ls, 2 * ls + 1)
 
 
 def orders(degree: int) -> Int[np.ndarray, " k"]:
     """Order m of each of the K coefficients: 0, -1, 0, 1, -2, …"""
     l = degrees(degree)
-    return np.arange(len(l)) - l * (l + 1)
+    return np.arange(len(l), dtype=np.int32) - l * (l + 1)
 
 
 def check_degree(degree: int) -> int:

@@ -58,7 +58,7 @@ def rotate_z(
     coefficients = as_float(coefficients)
     degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
     m = orders(degree)
-    mirrored = coefficients[..., np.arange(len(m)) - 2 * m]
+    mirrored = coefficients[..., np.arange(len(m), dtype=np.int32) - 2 * m]
     phase = jnp.asarray(angle, coefficients.dtype)[..., None]
     phase = jnp.multiply(*align(phase, jnp.asarray(m, phase.dtype)))
     coefficients, mirrored, phase = align(coefficients, mirrored, phase)

@@ -105,7 +105,7 @@ def zenith_table(degree: int) -> ZenithTable:
 @functools.cache
 def gradient_table(degree: int) -> GradientTable:
     count = (degree + 1) ** 2
-    row, value = np.zeros((2, 3, count), int), np.zeros((2, 3, count))
+    row, value = np.zeros((2, 3, count), np.int32), np.zeros((2, 3, count))
     x, y, z = range(3)
     for l in range(1, degree + 1):
         scale = np.sqrt((2 * l + 1) / (2 * l - 1))

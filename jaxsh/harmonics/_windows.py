@@ -88,7 +88,8 @@ def dering(
 @functools.partial(jax.jit, static_argnames="degree")
 def _least_strength(coefficients: Float[Array, " k"], degree: int) -> Float[Array, ""]:
     basis = jnp.asarray(exact_grid(4 * degree, degree).basis, coefficients.dtype)
-    first = np.arange(degree + 1) ** 2  # a window is constant over a band, so bands are enough
+    # A window is constant over a band, so a function's bands are enough.
+    first = np.arange(degree + 1, dtype=np.int32) ** 2
     bands = jnp.stack(
         [
             jnp.matmul(

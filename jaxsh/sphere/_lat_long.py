@@ -71,7 +71,8 @@ def _reconstruct(coefficients, height: int, width: int):
     meridians, azimuths = _tables(height, width, degree)
     # A coefficient (l, m) with l < |m| does not exist: whatever is there meets a zero meridian.
     place = np.array(
-        [[index(max(l, abs(m)), m) for l in range(degree + 1)] for m in range(-degree, degree + 1)]
+        [[index(max(l, abs(m)), m) for l in range(degree + 1)] for m in range(-degree, degree + 1)],
+        dtype=np.int32,
     )
     dtype = coefficients.dtype
     along_rows = _einsum("cml,mlh->mhc", coefficients[:, place], meridians.astype(dtype))

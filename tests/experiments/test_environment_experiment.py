@@ -1,0 +1,59 @@
+"""The experiment `environment` end to end on the embedded data, small."""
+
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from experiments.__main__ import main
+from experiments.environment import direct_irradiance, irradiance
+from jaxsh import sphere
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("results")
+    options = ["--out", str(out), "--degrees", "1", "2", "6", "--size", "48", "--no-progress"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("JAXSH_DATA", raising=False)
+        assert main(["run", "environment", *options]) == 0
+    return out / "environment" / "quick"
+
+
+def test_error_falls_with_degree(folder):
+    rows = json.loads((folder / "metrics.json").read_text())
+    plain = [row for row in rows if row["window"] == "none"]
+    assert [row["degree"] for row in plain] == [1, 2, 6]
+    for better in ("mean_error", "max_error", "relative_error"):
+        assert plain[0][better] > 2 * plain[1][better] > 4 * plain[2][better] > 0
+    assert plain[0]["psnr"] + 6 < plain[1]["psnr"] < plain[2]["psnr"] - 6
+    assert all(row["reference_rounding"] < 5e-6 for row in rows)  # measured 5e-7
+
+
+def test_windows_trade_error_for_negative_light(folder):
+    rows = json.loads((folder / "metrics.json").read_text())
+    at = {row["window"]: row for row in rows if row["degree"] == 6}
+    assert at["dering light"]["negative_light"] < 0.01 < at["hann"]["negative_light"]
+    assert at["hann"]["negative_light"] < at["lanczos"]["negative_light"]
+    assert at["lanczos"]["negative_light"] < at["none"]["negative_light"]
+    assert at["dering irradiance"]["mean_error"] < at["lanczos"]["mean_error"]
+
+
+def test_pictures_and_table(folder):
+    table = (folder / "table.md").read_text()
+    for picture in ("studio.png", "environments.png"):
+        assert (folder / picture).stat().st_size > 5_000
+        assert f"({picture})" in table
+
+
+def test_direct_irradiance_is_the_integral(rng):
+    """Against the closed form: a light of degree 2 on a picture of 128 rows."""
+    light = jnp.asarray(rng.normal(size=(3, 9)))
+    normals = rng.normal(size=(7, 3))
+    normals = jnp.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True))
+    image = sphere.reconstruct_lat_long(light, 128, 256)
+    # The midpoint rule over pixels and the cosine's edge: 2e-4 at this resolution.
+    np.testing.assert_allclose(
+        direct_irradiance(normals, image), irradiance(light, normals), atol=5e-4
+    )
