@@ -33,7 +33,7 @@ test: $(VENV)/installed
 check: $(VENV)/installed
 	$(bin)/ruff check .
 	$(bin)/ruff format --check .
-	$(bin)/basedpyright
+	$(bin)/basedpyright --pythonpath $(bin)/python
 
 bench: $(BENCH_VENV)/installed
 	$(BENCH_VENV)/bin/python -m benchmarks

@@ -8,7 +8,7 @@ the probe for every vertex, this measures how nearly, and what a window costs.
 import dataclasses
 import functools
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import jax
 import jax.numpy as jnp
@@ -18,13 +18,16 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Array, Float
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 
 from jaxsh import geometry, harmonics, imaging, sphere
 
 from . import Column, Context, Table, experiment
 
 ALBEDO = 0.5
-WINDOWS = ("none", "hann", "lanczos", "dering light", "dering irradiance")
+Window = Literal["none", "hann", "lanczos", "dering light", "dering irradiance"]
+WINDOWS: tuple[Window, ...] = get_args(Window)
 
 # "… to achieve average errors of only 1%" with nine coefficients: the paper's abstract. Of its
 # probes these three are among ours.
@@ -141,10 +144,12 @@ def irradiance(light: Float[Array, "3 k"], normals: Float[Array, "v 3"]) -> Floa
     return sphere.reconstruct(harmonics.convolve(light, kernel), normals).T
 
 
-def _windowed(light: Float[Array, "3 k"], window: str) -> tuple[Float[Array, "3 k"], float | None]:
+def _windowed(
+    light: Float[Array, "3 k"], window: Window
+) -> tuple[Float[Array, "3 k"], float | None]:
     """The light under a window, and `dering`'s strength: the largest of the channels', for all."""
     degree = harmonics.degree_of(light.shape[-1])
-    if not window.startswith("dering"):
+    if window != "dering light" and window != "dering irradiance":
         return light * harmonics.window(window, degree)[None], None
     kernel = harmonics.clamped_cosine(degree)
     judged = light if window == "dering light" else harmonics.convolve(light, kernel)
@@ -239,7 +244,7 @@ def _draw(path, environment, reference, shots, exposure, view: View) -> None:
     axes[0, 0].imshow(imaging.tone_map(environment, glow), extent=(0, 2, 0, 1))
     axes[0, 0].set_title("probe")
     axes[1, 0].imshow(_over_white(reference, exposure, view))
-    error = None
+    error = ScalarMappable(Normalize(-10, 10), "RdBu_r")
     for column, shot in enumerate(shots, start=1):
         light = sphere.reconstruct_lat_long(shot.light, height, width)
         # Negative light has no colour of its own: it is shown as pure blue.
@@ -250,7 +255,7 @@ def _draw(path, environment, reference, shots, exposure, view: View) -> None:
         axes[1, column].imshow(_over_white(shot.image, exposure, view))
         difference = 100 * jnp.mean(shot.image - reference, axis=-1) * exposure
         difference = np.where(view.raster.mask, difference, np.nan)
-        error = axes[2, column].imshow(difference, cmap="RdBu_r", vmin=-10, vmax=10)
+        axes[2, column].imshow(difference, cmap=error.cmap, norm=error.norm)
     for axis in axes.flat:
         axis.axis("off")
     scale = axes[2, 0].inset_axes((0.8, 0.1, 0.06, 0.8))

@@ -5,11 +5,12 @@ function of degree L has K = (L+1)² coefficients. Directions are x, y, z.
 """
 
 from ._basis import evaluate, evaluate_with_gradient
+from ._dering import dering
 from ._indexing import degree_of, degrees, index, num_coefficients, orders
 from ._products import gaunt, product, product_matrix, triple_integral
 from ._rotation import rotate, rotate_z, rotation_matrix
 from ._tables import legendre
-from ._windows import damping, dering, window
+from ._windows import damping, window
 from ._zonal import clamped_cosine, convolve, phong
 
 __all__ = [
