@@ -1,7 +1,9 @@
 """``python -m benchmarks [options]``: writes ``results/benchmarks/report.md`` and ``rows.json``."""
 
 import dataclasses
+import itertools
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,12 +17,21 @@ from experiments import Column, Table
 from experiments._machine import describe
 from experiments._report import to_json, to_markdown, write
 
+# glibc's settings with which a process keeps what it frees.
+KEEPING = {
+    "MALLOC_ARENA_MAX": "1",
+    "MALLOC_MMAP_MAX_": "0",
+    "MALLOC_TOP_PAD_": "268435456",
+    "MALLOC_TRIM_THRESHOLD_": "2000000000",
+}
+
 _BASIS = [
     Column("quantity", "quantity"),
     Column("dtype", "dtype"),
     Column("degree", "degree"),
     Column("count", "N"),
     Column("cores", "cores"),
+    Column("allocator", "allocator"),
     Column("ours_ms", "ours, ms", digits=2),
     Column("over_floor", "ours / write floor", digits=1),
     Column("sphericart", "sphericart / ours", digits=2),
@@ -59,6 +70,8 @@ class Options:
     """precisions of the basis"""
     cores: tuple[Literal["one", "all"], ...] = ("one", "all")
     """one: CPU time, pinned to a core; all: wall clock"""
+    allocators: tuple[Literal["keeping", "default"], ...] = ("keeping", "default")
+    """keeping: freed pages stay with the process; default: as glibc does, for float32 alone"""
     error_degrees: tuple[int, ...] = (6, 10, 13, 20, 30)
     """degrees of the table of float32 errors"""
     rounds: int = 15
@@ -73,7 +86,7 @@ def run(options: Options) -> Path:
     options.out.mkdir(parents=True, exist_ok=True)
     progress = tqdm(list(_requests(options)), "benchmarks", file=sys.stderr)
     for request in progress:
-        progress.set_postfix_str(f"{request['table']}, {request['dtype']}, {request['cores']}")
+        progress.set_postfix_str(" ".join(request[k] for k in ("table", "dtype", "cores")))
         for row in _measure(request):
             tables[request["table"]].append(row)
             write(options.out / "rows.json", to_json(tables))
@@ -86,8 +99,10 @@ def run(options: Options) -> Path:
     ]
     layout = (
         "Ratios above 1: ours is faster. Ours with `axis=0`. Medians over interleaved rounds, each "
-        "the fastest of three calls, so that large fresh outputs (the default allocator maps 32 MB "
-        "and more anew at every call) cost all rivals the same page faults."
+        "the fastest of three calls. glibc's default allocator gives large freed buffers back to "
+        "the system, and the page faults of the next call can cost more than its work, for ours "
+        "and for peers, depending on what else the process holds; the keeping one "
+        f"(`{' '.join(f'{k}={v}' for k, v in KEEPING.items())}`) shows the work itself."
     )
     report = [
         "# Benchmarks\n",
@@ -103,27 +118,29 @@ def run(options: Options) -> Path:
 
 def _requests(options: Options) -> Iterator[dict[str, Any]]:
     common = {"rounds": options.rounds}
-    for cores in options.cores:
-        for dtype in options.dtypes:
+    for cores, allocator, dtype in itertools.product(
+        options.cores, options.allocators, options.dtypes
+    ):
+        if allocator == "keeping" or dtype == "float32":
             yield common | {
                 "table": "basis",
                 "cores": cores,
+                "allocator": allocator,
                 "dtype": dtype,
                 "degrees": options.degrees,
                 "counts": options.counts,
             }
-        yield common | {"table": "lat_long", "cores": cores, "dtype": "float32", "degrees": [10]}
-    yield common | {
-        "table": "errors",
-        "cores": "all",
-        "dtype": "float32",
-        "degrees": options.error_degrees,
-    }
+    lat_long = {"table": "lat_long", "allocator": "keeping", "dtype": "float32", "degrees": [10]}
+    for cores in options.cores:
+        yield common | lat_long | {"cores": cores}
+    errors = {"table": "errors", "allocator": "keeping", "dtype": "float32", "cores": "all"}
+    yield common | errors | {"degrees": options.error_degrees}
 
 
 def _measure(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
     command = [sys.executable, "-m", "benchmarks._child", json.dumps(request)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+    environment = os.environ | (KEEPING if request["allocator"] == "keeping" else {})
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as child:
         assert child.stdout is not None
         yield from map(json.loads, child.stdout)
     if child.returncode:

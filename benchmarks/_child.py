@@ -22,7 +22,7 @@ def main(request: dict) -> None:
         if request["table"] == "basis":
             for count in request["counts"]:
                 for row in basis.timings(degree, count, np.dtype(request["dtype"]), rounds):
-                    _emit(row | {"cores": request["cores"]})
+                    _emit(row | {key: request[key] for key in ("cores", "allocator")})
         elif request["table"] == "lat_long":
             for row in lat_long.timings(degree, 256, rounds):
                 _emit(row | {"cores": request["cores"]})

@@ -35,9 +35,10 @@ def evaluate(
     - `axis`: where the K = (degree+1)² coefficients go: -1 for (..., K), or 0 for (K, ...), the
       layout that they are computed in, which saves a transpose.
 
-    **Returns** an array of the input's dtype. All derivatives, to every order and in every mode,
-    are finite for every nonzero vector, the poles included. A zero vector has no direction and
-    gives NaN. Raises `ValueError` for a wrong shape, degree or axis.
+    **Returns** an array of the input's dtype. Derivatives to every order and in every mode are
+    finite in every direction, the poles included, as long as |s|^-order fits the dtype. A zero
+    vector has no direction and gives NaN; components that are subnormal count as zero. Raises
+    `ValueError` for a wrong shape, degree or axis.
 
     The batch is the axis along which the kernels run: pass a whole batch rather than `jax.vmap`
     over single vectors.
@@ -71,7 +72,7 @@ def _checked(vectors, degree, axis):
 @functools.partial(jax.jit, static_argnums=(1, 2))
 def _evaluate(vectors, degree, axis):
     unit, _ = _normalize(vectors)
-    basis = _solid(unit, degree).reshape(-1, *vectors.shape[:-1])
+    basis = _solid(unit, degree).reshape((degree + 1) ** 2, *vectors.shape[:-1])
     return basis if axis == 0 else jnp.moveaxis(basis, 0, -1)
 
 
@@ -85,8 +86,8 @@ def _evaluate_with_gradient(vectors, degree, axis):
     scale = np.sqrt(4 * np.pi / 3) * degrees(degree)
     radial = jnp.stack([x, y, z]) * (scale.astype(basis.dtype)[:, None] * basis)[None]
     gradient = (_derivative(basis, degree) - radial) * (1 / length)[None]
-    batch = vectors.shape[:-1]
-    basis, gradient = basis.reshape(-1, *batch), gradient.reshape(3, -1, *batch)
+    shape = ((degree + 1) ** 2, *vectors.shape[:-1])
+    basis, gradient = basis.reshape(shape), gradient.reshape(3, *shape)
     if axis == 0:
         return basis, gradient
     return jnp.moveaxis(basis, 0, -1), jnp.moveaxis(gradient, (0, 1), (-1, -2))
@@ -97,12 +98,15 @@ def _normalize(
 ) -> tuple[Float[Array, "3 1 n"], Float[Array, "1 n"]]:
     """Unit vectors, components first, and the vectors' lengths."""
     s = vectors.reshape(-1, 3).T[:, None]
-    # A length whose square would over- or underflow is none the less a length. The scale cancels,
-    # so it is a constant to derivatives.
-    scale = jax.lax.stop_gradient(jnp.max(jnp.abs(s), axis=0, keepdims=True))
-    scaled = s / scale
+    # A length whose square would over- or underflow is none the less a length, so the largest
+    # component is taken out; after a power of two, since the reciprocal of a very large one would
+    # itself be flushed to zero. Both cancel and are constants to derivatives.
+    largest = jax.lax.stop_gradient(jnp.max(jnp.abs(s), axis=0, keepdims=True))
+    power = 2.0 ** (jnp.finfo(s.dtype).maxexp // 2)
+    power = jnp.where(largest > 1, jnp.asarray(1 / power, s.dtype), jnp.asarray(power, s.dtype))
+    scaled = (s * power) / (largest * power)
     length = jnp.sqrt(jnp.sum(scaled**2, axis=0, keepdims=True))
-    return scaled / length, (scale * length)[0]
+    return scaled / length, (largest * length)[0]
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1,))
@@ -155,7 +159,7 @@ def _azimuth(unit: Float[Array, "3 1 n"], degree: int):
 
     parts = tuple(jnp.asarray(_columns(t, x.dtype)) for t in azimuth_table(degree))
     azimuth, heights = jax.lax.map(rows, (parts, jnp.eye(2, dtype=z.dtype)))
-    return azimuth.reshape(-1, x.shape[-1]), heights
+    return azimuth.reshape(2 * (degree + 1), x.shape[-1]), heights
 
 
 def _columns(table: Float[np.ndarray, "..."], dtype) -> Float[np.ndarray, "..."]:
@@ -165,5 +169,5 @@ def _columns(table: Float[np.ndarray, "..."], dtype) -> Float[np.ndarray, "..."]
     return np.moveaxis(table, -1, -2).astype(dtype)[..., None]
 
 
-def _take(rows: Float[Array, "k n"], index: np.ndarray) -> Float[Array, "j n"]:
+def _take(rows: Float[Array, "k n"], index: np.ndarray) -> Float[Array, "... n"]:
     return rows.at[index].get(mode="promise_in_bounds")

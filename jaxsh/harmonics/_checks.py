@@ -1,5 +1,7 @@
 """Bad input met early: one sentence that says what was expected and what came."""
 
+import math
+
 import jax.numpy as jnp
 from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
@@ -27,3 +29,8 @@ def align(*arrays: Array) -> tuple[Array, ...]:
     """
     ndim = max(array.ndim for array in arrays)
     return tuple(array.reshape((1,) * (ndim - array.ndim) + array.shape) for array in arrays)
+
+
+def flatten_batch(array: Float[Array, "*batch n"]) -> Float[Array, "rows n"]:
+    """All leading axes as one, an empty one too, whose size `reshape` could not infer."""
+    return array.reshape(math.prod(array.shape[:-1]), array.shape[-1])

@@ -8,13 +8,13 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from ._basis import evaluate
-from ._checks import as_float
+from ._checks import as_float, flatten_batch
 from ._indexing import degree_of, degrees, orders
 from ._tables import legendre
 from ._windows import damping
 
-# Rounds of the search for the least strength, and halvings in each: past a float64's digits.
-_CUTS, _HALVINGS = 16, 60
+# Rounds of the search for the least strength; in each, valleys looked into and halvings.
+_CUTS, _VALLEYS, _HALVINGS = 16, 8, 60
 
 
 def dering(
@@ -27,47 +27,77 @@ def dering(
 
     What is left below zero is under 1e-3 of the mean, and mostly far under. A function without
     negative values is returned as it is, with strength 0; one whose mean is not positive cannot be
-    helped and keeps nothing but its mean, with strength infinity. Differentiable: the strength by
-    the implicit function theorem, with a kink where it reaches zero or the darkest direction
-    changes.
+    helped and keeps nothing but its mean, with strength infinity. Differentiable once, by the
+    implicit function theorem, with a kink where the strength reaches zero or the darkest direction
+    jumps; a second derivative raises `NotImplementedError`.
     """
     coefficients = as_float(coefficients)
     degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
-    rows = coefficients.reshape(-1, coefficients.shape[-1])
-    strength = jax.vmap(functools.partial(_least_strength, degree=degree))(rows)
+    strength = jax.vmap(lambda one: _least_strength(one, degree))(flatten_batch(coefficients))
     strength = strength.reshape(coefficients.shape[:-1])
     return coefficients * damping(strength, degree), strength
 
 
-@functools.partial(jax.jit, static_argnames="degree")
+@functools.partial(jax.custom_jvp, nondiff_argnums=(1,))
 def _least_strength(coefficients: Float[Array, " k"], degree: int) -> Float[Array, ""]:
-    """Cutting planes: the least strength for the darkest direction, until none is dark."""
+    return _search(coefficients, degree)[0]
 
-    def bands(coefficients, direction):
-        return _band_sums(coefficients * evaluate(direction, degree), degree)
 
-    def at(strength, bands):
-        return jnp.dot(_band_window(strength, degree), bands)
+@_least_strength.defjvp
+def _least_strength_jvp(degree, primals, tangents):
+    (coefficients,), (tangent,) = primals, tangents
+    strength, direction = _search(jax.lax.stop_gradient(coefficients), degree)
+    # The value at the darkest direction stays zero: dλ = -(∂f/∂c · dc) / (∂f/∂λ). Where that
+    # direction goes does not matter, since f is least there.
+    basis = evaluate(direction, degree)
+    bands = _band_sums(jax.lax.stop_gradient(coefficients) * basis, degree)
+    slope = jax.grad(_value)(strength, bands)
+    regular = (strength > 0) & jnp.isfinite(strength) & (slope > 0)
+    gradient = -damping(strength, degree) * basis / jnp.where(regular, slope, 1)
+    gradient = _once(jnp.where(regular, gradient, 0), coefficients)
+    return strength, jnp.dot(gradient, tangent, precision="highest")
+
+
+@jax.custom_jvp
+def _once(value: Array, origin: Array) -> Array:
+    """`value`, which must not be differentiated with respect to `origin`."""
+    return value
+
+
+@_once.defjvp
+def _once_jvp(primals, tangents):
+    raise NotImplementedError("dering has first derivatives only")
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _search(
+    coefficients: Float[Array, " k"], degree: int
+) -> tuple[Float[Array, ""], Float[Array, " 3"]]:
+    """Cutting planes: the least strength for the darkest direction, until none is dark.
+
+    Returns it with the direction that decided last.
+    """
 
     def cut(_, state):
-        strength, _ = state
-        direction = _darkest(constant * damping(strength, degree), degree)
-        return _root(at, bands(constant, direction), strength), direction
+        strength, decisive = state
+        direction = _darkest(coefficients * damping(strength, degree), degree)
+        bands = _band_sums(coefficients * evaluate(direction, degree), degree)
+        negative = _value(strength, bands) < 0
+        raised = jnp.where(negative, _root(bands, strength), strength)
+        return raised, jnp.where(negative, direction, decisive)
 
-    constant = jax.lax.stop_gradient(coefficients)
-    zero, anywhere = jnp.zeros((), coefficients.dtype), jnp.zeros(3, coefficients.dtype)
-    strength, direction = jax.lax.fori_loop(0, _CUTS, cut, (zero, anywhere))
-    # Nothing of the search is differentiated. One Newton step, zero in value, carries the
-    # derivative of the root: dλ = -dg / (∂g/∂λ).
-    slope = jax.lax.stop_gradient(jax.grad(at)(strength, bands(constant, direction)))
-    value = at(jax.lax.stop_gradient(strength), bands(coefficients, direction))
-    step = (value - jax.lax.stop_gradient(value)) / jnp.where(slope > 0, slope, 1)
-    regular = (strength > 0) & jnp.isfinite(strength) & (slope > 0)
-    return jnp.where(regular, strength - step, strength)
+    start = (jnp.zeros((), coefficients.dtype), jnp.eye(3, dtype=coefficients.dtype)[2])
+    return jax.lax.fori_loop(0, _CUTS, cut, start)
 
 
-def _root(at, bands: Float[Array, " bands"], low: Float[Array, ""]) -> Float[Array, ""]:
-    """Least strength from `low` on at which the window leaves a direction's value not negative."""
+def _value(strength: Float[Array, ""], bands: Float[Array, " bands"]) -> Float[Array, ""]:
+    """A function's value under the window, from the sums of its bands in one direction."""
+    first = np.arange(len(bands), dtype=np.int32) ** 2  # the window is constant over a band
+    return jnp.dot(damping(strength, len(bands) - 1)[first], bands, precision="highest")
+
+
+def _root(bands: Float[Array, " bands"], low: Float[Array, ""]) -> Float[Array, ""]:
+    """Strength above `low`, which is not enough, from which on one direction is not dark."""
     mean, swing = bands[0], jnp.sum(jnp.abs(bands[1:]))
     # On every band above the mean the window is at most 1/(4·strength): this much is enough.
     enough = jnp.where(mean > 0, swing / (4 * jnp.where(mean > 0, mean, 1)), jnp.inf)
@@ -75,48 +105,61 @@ def _root(at, bands: Float[Array, " bands"], low: Float[Array, ""]) -> Float[Arr
     def halve(_, bounds):
         low, high = bounds
         middle = (low + high) / 2
-        negative = at(middle, bands) < 0
+        negative = _value(middle, bands) < 0
         return jnp.where(negative, middle, low), jnp.where(negative, high, middle)
 
-    _, high = jax.lax.fori_loop(0, _HALVINGS, halve, (low, jnp.maximum(enough, low)))
-    return jnp.where(at(low, bands) < 0, high, low)
+    return jax.lax.fori_loop(0, _HALVINGS, halve, (low, jnp.maximum(enough, low)))[1]
 
 
 def _darkest(coefficients: Float[Array, " k"], degree: int) -> Float[Array, " 3"]:
-    """Direction of the least value: on a grid, then on ever smaller patches around it."""
+    """Direction of the least value: the lowest valleys of a grid, each searched more finely."""
     rings = 6 * degree + 8
     theta = (np.arange(rings) + 0.5) * np.pi / rings
     phi = np.arange(2 * rings) * np.pi / rings
     m = np.arange(-degree, degree + 1)[:, None]
-    azimuth = np.where(m < 0, np.sin(-m * phi), np.cos(m * phi)).astype(coefficients.dtype)
-    meridians = legendre(np.cos(theta), degree).astype(coefficients.dtype)
+    dtype = coefficients.dtype
+    azimuth = np.where(m < 0, np.sin(-m * phi), np.cos(m * phi)).astype(dtype)
+    meridians = legendre(np.cos(theta), degree).astype(dtype)
     by_order = jax.ops.segment_sum(
         coefficients[:, None] * meridians, orders(degree) + degree, len(azimuth)
     )
     samples = jnp.matmul(by_order.T, azimuth, precision="highest")
-    ring, step = jnp.unravel_index(jnp.argmin(samples), samples.shape)
-    dtype = coefficients.dtype
-    polar, around = jnp.asarray(theta, dtype)[ring], jnp.asarray(phi, dtype)[step]
-    direction = jnp.stack(
-        [jnp.sin(polar) * jnp.cos(around), jnp.sin(polar) * jnp.sin(around), jnp.cos(polar)]
+    # Neighbours: around in φ, and in θ up to the first and last ring.
+    ring = jnp.minimum(jnp.roll(samples, 1, axis=1), jnp.roll(samples, -1, axis=1))
+    row = jnp.minimum(ring, samples)
+    above, below = jnp.concatenate([row[:1], row[:-1]]), jnp.concatenate([row[1:], row[-1:]])
+    valley = samples <= jnp.minimum(ring, jnp.minimum(above, below))
+    _, lowest = jax.lax.top_k(-jnp.where(valley, samples, jnp.inf).ravel(), _VALLEYS)
+    polar = jnp.asarray(theta, dtype)[lowest // len(phi)]
+    around = jnp.asarray(phi, dtype)[lowest % len(phi)]
+    starts = jnp.stack(
+        [jnp.sin(polar) * jnp.cos(around), jnp.sin(polar) * jnp.sin(around), jnp.cos(polar)], -1
     )
+    directions, values = _refine(coefficients, starts, degree, reach=float(theta[0]))
+    return directions[jnp.argmin(values)]
+
+
+def _refine(
+    coefficients: Float[Array, " k"], directions: Float[Array, "v 3"], degree: int, reach: float
+) -> tuple[Float[Array, "v 3"], Float[Array, " v"]]:
+    """The least value near each direction: on a patch as wide as `reach`, and on finer ones."""
+    dtype = coefficients.dtype
     u, v = np.meshgrid(*2 * [np.linspace(-1, 1, 9)])
-    patch = np.stack([u.ravel(), v.ravel()], axis=-1)
-    for scale in (theta[0], theta[0] / 4, theta[0] / 16):  # half a step of the grid, and finer
+    patch = jnp.asarray(np.stack([u.ravel(), v.ravel()], axis=-1), dtype)
+    chosen, values = np.arange(len(directions), dtype=np.int32), jnp.zeros(len(directions), dtype)
+    for scale in (reach, reach / 4, reach / 16):
         # Any two directions that span the tangent plane will do.
-        axis = jnp.eye(3, dtype=dtype)[jnp.argmin(jnp.abs(direction))]
-        side = jnp.cross(direction, axis)
-        tangents = jnp.stack([side, jnp.cross(direction, side)])
-        tangents = tangents / jnp.linalg.norm(side)
-        nearby = direction[None] + jnp.asarray(scale * patch, dtype) @ tangents
+        axis = jnp.eye(3, dtype=dtype)[jnp.argmin(jnp.abs(directions), axis=-1)]
+        side = jnp.cross(directions, axis)
+        side = side / jnp.linalg.norm(side, axis=-1, keepdims=True)
+        tangents = jnp.stack([side, jnp.cross(directions, side)], axis=1)
+        nearby = directions[:, None] + scale * jnp.einsum("pt,vtx->vpx", patch, tangents)
         nearby = nearby / jnp.linalg.norm(nearby, axis=-1, keepdims=True)
-        values = jnp.matmul(coefficients, evaluate(nearby, degree, axis=0), precision="highest")
-        direction = nearby[jnp.argmin(values)]
-    return direction
-
-
-def _band_window(strength: Float[Array, ""], degree: int) -> Float[Array, " bands"]:
-    return damping(strength, degree)[np.arange(degree + 1, dtype=np.int32) ** 2]
+        basis = evaluate(nearby, degree, axis=0)
+        samples = jnp.einsum("k,kvp->vp", coefficients, basis, precision="highest")
+        best = jnp.argmin(samples, axis=-1)
+        directions, values = nearby[chosen, best], samples[chosen, best]
+    return directions, values
 
 
 def _band_sums(terms: Float[Array, " k"], degree: int) -> Float[Array, " bands"]:

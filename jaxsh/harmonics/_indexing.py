@@ -17,12 +17,12 @@ def degree_of(count: int) -> int:
 
     Raises `ValueError` where `count` is not a square: 1, 4, 9, 16, …
     """
-    degree = math.isqrt(max(count, 0)) - 1
-    if degree < 0 or (degree + 1) ** 2 != count:
+    bands = math.isqrt(count) if isinstance(count, int | np.integer) and count > 0 else 0
+    if bands == 0 or bands**2 != count:
         raise ValueError(
             f"expected (degree + 1)² = 1, 4, 9, 16, … coefficients on the last axis, got {count}"
         )
-    return degree
+    return bands - 1
 
 
 def index(l: int, m: int) -> int:

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ._checks import align, as_float
+from ._checks import align, as_float, flatten_batch
 from ._grid import exact_grid
 from ._indexing import check_degree, degree_of, num_coefficients
 
@@ -52,7 +52,8 @@ def triple_integral(
 ) -> Float[Array, "*batch"]:
     """∫ f g h dω = Σ_ijk G_ijk f_i g_j h_k, for functions of any degrees. Batches broadcast."""
     f, g, *_ = _checked_pair(f, g)
-    f, h, _, h_degree = _checked_pair(f, h)
+    g, h, _, h_degree = _checked_pair(g, h)
+    f = f.astype(h.dtype)
     return jnp.sum(jnp.multiply(*align(_product(f, g, h_degree), h)), axis=-1)
 
 
@@ -95,8 +96,8 @@ def _product(f, g, degree: int):
     pair = tuple(jnp.broadcast_to(one, (*batch, one.shape[-1])) for one in (f, g))
     if math.prod(batch) <= _BLOCK:
         return multiply(pair)
-    rows = jax.tree.map(lambda one: one.reshape(-1, one.shape[-1]), pair)
-    return jax.lax.map(multiply, rows, batch_size=_BLOCK).reshape(*batch, -1)
+    rows = jax.tree.map(flatten_batch, pair)
+    return jax.lax.map(multiply, rows, batch_size=_BLOCK).reshape(*batch, project.shape[-1])
 
 
 @functools.partial(jax.jit, static_argnums=1)

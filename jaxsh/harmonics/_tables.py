@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from ._indexing import degrees, index, orders
+from ._indexing import check_degree, degrees, index, orders
 
 
 class AzimuthTable(NamedTuple):
@@ -159,6 +159,7 @@ def legendre(cos_theta: Float[np.ndarray, " n"], degree: int) -> Float[np.ndarra
     `cos_theta` is a NumPy array in [-1, 1]; the result is NumPy float64, by the usual three-term
     recursion in l, stable to high degree and independent of `evaluate`. Not differentiable.
     """
+    check_degree(degree)
     z = np.asarray(cos_theta, np.float64)
     sin_theta = np.sqrt((1 - z) * (1 + z))
     table = np.zeros(((degree + 1) ** 2, *z.shape))

@@ -26,12 +26,12 @@ def phong(
     I_0 = 1/(k+1) and I_1 = 1/(k+2), for any real exponent k > -1; differentiable in it.
     `normalized` divides by λ_0, so that the lobe integrates to one and keeps a constant light.
 
-    Raises `ValueError` where the exponent's value is known and not above -1.
+    Raises `ValueError` where the exponent's value is known and not finite and above -1.
     """
     check_degree(degree)
     k = as_float(exponent)
-    if is_concrete(k) and not np.all(np.asarray(k) > -1):
-        raise ValueError(f"a Phong exponent must be above -1, got {k}")
+    if is_concrete(k) and not np.all((np.asarray(k) > -1) & np.isfinite(k)):
+        raise ValueError(f"a Phong exponent must be finite and above -1, got {k}")
     integrals = [1 / (k + 1), 1 / (k + 2)]
     for l in range(2, degree + 1):
         integrals.append(integrals[-2] * (k - (l - 2)) / (k + (l + 1)))

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from ..harmonics import degree_of, evaluate
-from ..harmonics._checks import as_float
+from ..harmonics._checks import as_float, flatten_batch
 from ..harmonics._indexing import check_degree
 from ._quadrature import Quadrature
 
@@ -53,7 +53,7 @@ def reconstruct(
 
 @functools.partial(jax.jit, static_argnums=2)
 def _project(values, quadrature, degree: int):
-    weighted = values.reshape(-1, values.shape[-1]) * quadrature.weights.astype(values.dtype)[None]
+    weighted = flatten_batch(values) * quadrature.weights.astype(values.dtype)[None]
     directions = _blocks(quadrature.directions.astype(values.dtype), pad=(0, 0, 1))
     blocks = _blocks(weighted.T, pad=(0,) * len(weighted))
 
@@ -65,13 +65,13 @@ def _project(values, quadrature, degree: int):
 
     start = jnp.zeros(((degree + 1) ** 2, len(weighted)), values.dtype)
     total, _ = jax.lax.scan(add, start, (directions, blocks))
-    return total.T.reshape(*values.shape[:-1], -1)
+    return total.T.reshape(*values.shape[:-1], len(total))
 
 
 @jax.jit
 def _reconstruct(coefficients, directions):
     degree = degree_of(coefficients.shape[-1])
-    rows = coefficients.reshape(-1, coefficients.shape[-1])
+    rows = flatten_batch(coefficients)
 
     @jax.checkpoint
     def block(directions):
@@ -79,8 +79,8 @@ def _reconstruct(coefficients, directions):
         return jnp.matmul(rows, basis, precision="highest")
 
     blocks = jax.lax.map(block, _blocks(directions, pad=(0, 0, 1)))
-    values = jnp.moveaxis(blocks, 0, 1).reshape(len(rows), -1)[:, : len(directions)]
-    return values.reshape(*coefficients.shape[:-1], -1)
+    values = jnp.moveaxis(blocks, 0, 1).reshape(len(rows), blocks.shape[0] * blocks.shape[-1])
+    return values[:, : len(directions)].reshape(*coefficients.shape[:-1], len(directions))
 
 
 def _blocks(rows: Float[Array, "n c"], pad: tuple[int, ...]) -> Float[Array, "blocks size c"]:
@@ -88,4 +88,5 @@ def _blocks(rows: Float[Array, "n c"], pad: tuple[int, ...]) -> Float[Array, "bl
     size = max(1, min(_BLOCK, len(rows)))
     missing = -len(rows) % size
     filler = jnp.broadcast_to(jnp.asarray(pad, rows.dtype), (missing, len(pad)))
-    return jnp.concatenate([rows, filler]).reshape(-1, size, rows.shape[-1])
+    filled = jnp.concatenate([rows, filler])
+    return filled.reshape(len(filled) // size, size, rows.shape[-1])

@@ -1,5 +1,7 @@
 """Quadratures of the sphere: directions with weights that sum to 4π."""
 
+import operator
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -11,8 +13,8 @@ from ..harmonics._grid import exact_grid
 class Quadrature(eqx.Module):
     """∫ f dω ≈ Σ_n weights_n f(directions_n), with unit directions and positive weights."""
 
-    directions: Float[Array, "n 3"]
-    weights: Float[Array, " n"]
+    directions: Float[Array, "n 3"] = eqx.field(converter=jnp.asarray)
+    weights: Float[Array, " n"] = eqx.field(converter=jnp.asarray)
 
 
 def gauss_legendre(degree: int) -> Quadrature:
@@ -21,17 +23,17 @@ def gauss_legendre(degree: int) -> Quadrature:
     Gauss–Legendre in cos θ and degree + 1 equal steps in φ, about degree²/2 directions: the
     fewest of the quadratures here. To project a function of degree L onto degree L take 2L.
     """
-    grid = exact_grid(_positive("degree", degree, least=0), 0)
+    grid = exact_grid(_size("degree", degree, least=0), 0)
     return _quadrature(grid.directions, grid.weights)
 
 
 def fibonacci(count: int) -> Quadrature:
     """`count` directions of equal weight along a spiral: even coverage at any number.
 
-    Not exact for any degree. The error falls about as count^-2 for smooth functions and as
+    Not exact for any degree. The error falls about as count^-3/2 for smooth functions and as
     count^-3/4 for those with edges, where an exact quadrature is no better.
     """
-    n = np.arange(_positive("count", count))
+    n = np.arange(_size("count", count))
     golden = (1 + np.sqrt(5)) / 2
     z, phi = 1 - (2 * n + 1) / count, 2 * np.pi * n / golden
     radius = np.sqrt(1 - z**2)
@@ -42,12 +44,12 @@ def fibonacci(count: int) -> Quadrature:
 def cube_map(resolution: int) -> Quadrature:
     """Texel centres and exact texel solid angles of a cube map, 6·resolution² of them.
 
-    Faces in the order +x, -x, +y, -y, +z, -z, each row by row as OpenGL and Direct3D store them,
-    seen from inside: on -y, which a camera looking ahead with z up meets, rows run down from +z.
+    Faces in the order +x, -x, +y, -y, +z, -z, each row by row, with the texel directions of
+    OpenGL's and Direct3D's table: on +x, for one, (1, -v, -u) at column u and row v in [-1, 1].
     Exact for functions that are constant on each texel; otherwise the error falls as
     resolution^-2.
     """
-    edge = np.linspace(-1, 1, _positive("resolution", resolution) + 1)
+    edge = np.linspace(-1, 1, _size("resolution", resolution) + 1)
     centre = (edge[1:] + edge[:-1]) / 2
     # The integral of (1 + u² + v²)^-3/2 over [0, a] × [0, b] is atan(ab/√(1 + a² + b²)).
     corner = np.arctan2(np.multiply.outer(edge, edge), np.sqrt(1 + np.add.outer(edge**2, edge**2)))
@@ -74,8 +76,8 @@ def lat_long(height: int, width: int) -> Quadrature:
     weights the rows integrate polynomials in cos θ exactly. At 256 rows they differ from the
     pixels' solid angles by 13 % in the row at a pole and by under 2e-4 from the 20th row on.
     """
-    theta = (np.arange(_positive("height", height)) + 0.5) * np.pi / height
-    phi = (np.arange(_positive("width", width)) + 0.5) * 2 * np.pi / width
+    theta = (np.arange(_size("height", height)) + 0.5) * np.pi / height
+    phi = (np.arange(_size("width", width)) + 0.5) * 2 * np.pi / width
     theta, phi = np.meshgrid(theta, phi, indexing="ij")
     sin_theta = np.sin(theta)
     directions = np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta)], -1)
@@ -100,7 +102,11 @@ def _quadrature(directions: np.ndarray, weights: np.ndarray) -> Quadrature:
     return Quadrature(jnp.asarray(directions, dtype), jnp.asarray(weights, dtype))
 
 
-def _positive(name: str, value: int, least: int = 1) -> int:
-    if value < least:
-        raise ValueError(f"{name} must be at least {least}, got {value}")
-    return value
+def _size(name: str, value: int, least: int = 1) -> int:
+    try:
+        size = operator.index(value)
+    except TypeError:
+        size = least - 1
+    if size < least:
+        raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
+    return size
