@@ -70,11 +70,11 @@ class Options:
     """precisions of the basis"""
     cores: tuple[Literal["one", "all"], ...] = ("one", "all")
     """one: CPU time, pinned to a core; all: wall clock"""
-    allocators: tuple[Literal["keeping", "default"], ...] = ("keeping", "default")
+    allocators: tuple[Literal["keeping", "default"], ...] = ("keeping",)
     """keeping: freed pages stay with the process; default: as glibc does, for float32 alone"""
     error_degrees: tuple[int, ...] = (6, 10, 13, 20, 30)
     """degrees of the table of float32 errors"""
-    rounds: int = 15
+    rounds: int = 9
     """interleaved rounds per row"""
     out: Path = Path("results/benchmarks")
     """where the report goes"""
