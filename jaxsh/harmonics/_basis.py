@@ -113,11 +113,11 @@ def _normalize(
 def _solid(unit: Float[Array, "3 1 n"], degree: int) -> Float[Array, "k n"]:
     """Values of r^l y_lm on the unit sphere, with the derivatives of that polynomial."""
     table = zenith_table(degree)
-    rows, (z, zz) = _azimuth(unit, degree)
-    e, f, alpha, beta = (_columns(t, z.dtype) for t in (table.e, table.f, table.alpha, table.beta))
-    basis = _take(rows, table.azimuth_row) * (e[0] * z + f[0])
-    for a, b in zip(alpha, beta, strict=True):
-        basis = basis * (a * zz + b)
+    rows, (z, u) = _azimuth(unit, degree)
+    e, f, factors = (t.astype(z.dtype)[..., None] for t in (table.e, table.f, table.factors))
+    basis = _take(rows, table.azimuth_row) * (e * z + f)
+    for first, *rest in factors:
+        basis = basis * functools.reduce(lambda value, c: value * u + c, rest, first)
     return basis
 
 
@@ -143,7 +143,7 @@ def _derivative(
 
 
 def _azimuth(unit: Float[Array, "3 1 n"], degree: int):
-    """C_0 … C_L, S_0 … S_L, the real and imaginary parts of (x + iy)^m; and z, z².
+    """C_0 … C_L, S_0 … S_L, the real and imaginary parts of (x + iy)^m; and z, z² - ½.
 
     The last two ride along so that they too come out of the loop as plain rows, and not as
     normalisations fused, K times over, into the large kernel.
@@ -151,22 +151,18 @@ def _azimuth(unit: Float[Array, "3 1 n"], degree: int):
     x, y, z = unit
 
     def rows(part):
-        (lone, alpha, beta, gamma), power = part
+        (lone, alpha, beta, gamma), square = part
         row = lone[0] + lone[1] * x + (lone[2] + lone[3] * x) * y
         for a, b, c in zip(alpha, beta, gamma, strict=True):
             row = row * (a * (x * x) + b * (y * y) + c)
-        return row, z * (power[0] + power[1] * z)
+        return row, jnp.where(square, z * z - 0.5, z)
 
-    parts = tuple(jnp.asarray(_columns(t, x.dtype)) for t in azimuth_table(degree))
-    azimuth, heights = jax.lax.map(rows, (parts, jnp.eye(2, dtype=z.dtype)))
+    # (part, row, n) -> (part, n, row, 1): columns that broadcast along the batch.
+    parts = tuple(
+        jnp.asarray(np.moveaxis(t, -1, -2)[..., None], x.dtype) for t in azimuth_table(degree)
+    )
+    azimuth, heights = jax.lax.map(rows, (parts, np.array([False, True])))
     return azimuth.reshape(2 * (degree + 1), x.shape[-1]), heights
-
-
-def _columns(table: Float[np.ndarray, "..."], dtype) -> Float[np.ndarray, "..."]:
-    """(..., rows, n) -> (..., n, rows, 1): columns that broadcast along the batch."""
-    if table.ndim == 1:
-        table = table[:, None]
-    return np.moveaxis(table, -1, -2).astype(dtype)[..., None]
 
 
 def _take(rows: Float[Array, "k n"], index: np.ndarray) -> Float[Array, "... n"]:
