@@ -1,8 +1,7 @@
 """Products of functions on the sphere.
 
-Everything here is ∫ y_i y_j y_k over a grid that is exact for it. The Gaunt tensor of these
-integrals is 3.7 % full at degree 10, yet on batches of functions two dense matrix products with
-the basis on the grid (sample, multiply, project) are faster than the tensor at every degree.
+Everything here is ∫ y_i y_j y_k over a grid that is exact for it: sample, multiply, project, which
+are dense matrix products with the basis on the grid, and need no tensor of K³ entries.
 """
 
 import functools

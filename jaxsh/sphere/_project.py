@@ -1,7 +1,6 @@
 """From samples to coefficients and back, in blocks: the basis is never held as a whole.
 
-A block's basis stays in cache and is multiplied while it is there, which is several times faster
-than evaluating everything and then multiplying, and takes no memory.
+A block's basis is multiplied while it is still in cache, and there is never more of it in memory.
 """
 
 import functools
