@@ -69,7 +69,7 @@ class Options:
     dtypes: tuple[Literal["float32", "float64"], ...] = ("float32", "float64")
     """precisions of the basis"""
     cores: tuple[Literal["one", "all"], ...] = ("one", "all")
-    """one: CPU time, pinned to a core; all: wall clock"""
+    """one: pinned to a core; all: free to use every one; wall clock in both"""
     allocators: tuple[Literal["keeping", "default"], ...] = ("keeping",)
     """keeping: freed pages stay with the process; default: as glibc does, for float32 alone"""
     error_degrees: tuple[int, ...] = (6, 10, 13, 20, 30)

@@ -87,7 +87,9 @@ def _search(
         return raised, jnp.where(negative, direction, decisive)
 
     start = (jnp.zeros((), coefficients.dtype), jnp.eye(3, dtype=coefficients.dtype)[2])
-    return jax.lax.fori_loop(0, _CUTS, cut, start)
+    strength, direction = jax.lax.fori_loop(0, _CUTS, cut, start)
+    # No comparison with NaN is true, which must not pass for "nothing is dark".
+    return jnp.where(jnp.isfinite(coefficients).all(), strength, jnp.nan), direction
 
 
 def _value(strength: Float[Array, ""], bands: Float[Array, " bands"]) -> Float[Array, ""]:

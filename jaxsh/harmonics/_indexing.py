@@ -30,6 +30,7 @@ def index(l: int, m: int) -> int:
 
     Raises `ValueError` unless l ≥ 0 and |m| ≤ l.
     """
+    l, m = operator.index(l), operator.index(m)
     if l < 0 or abs(m) > l:
         raise ValueError(f"expected l >= 0 and -l <= m <= l, got l = {l}, m = {m}")
     return l * (l + 1) + m

@@ -59,7 +59,7 @@ class GradientTable(NamedTuple):
 def azimuth_table(degree: int) -> AzimuthTable:
     rows, factors = degree + 1, degree // 2
     lone = np.zeros((2, rows, 4))
-    alpha, beta, gamma = np.zeros((2, rows, factors)), np.zeros((2, rows, factors)), None
+    alpha, beta = np.zeros((2, rows, factors)), np.zeros((2, rows, factors))
     gamma = np.ones((2, rows, factors))
     lone[0, 0, 0] = 1.0  # C_0 = 1; S_0 = 0 stays a row of zeros
     for m in range(1, rows):
@@ -165,6 +165,8 @@ def legendre(cos_theta: Float[np.ndarray, " n"], degree: int) -> Float[np.ndarra
     """
     check_degree(degree)
     z = np.asarray(cos_theta, np.float64)
+    if np.any(np.abs(z) > 1):
+        raise ValueError(f"cos_theta must be in [-1, 1], got {np.max(np.abs(z))} in size")
     sin_theta = np.sqrt((1 - z) * (1 + z))
     table = np.zeros(((degree + 1) ** 2, *z.shape))
     for m in range(degree + 1):

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ._checks import align, as_float
+from ._checks import align, as_float, is_concrete
 from ._indexing import check_degree, degrees, orders
 
 WINDOWS = ("none", "hann", "lanczos", "zonal-sinc")
@@ -49,7 +49,10 @@ def damping(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "
     It minimises the squared error plus `strength` times the squared Laplacian. Strength zero is
     no window; infinity leaves the mean alone. Differentiable in the strength.
     """
-    strength = as_float(strength)[..., None]
+    strength = as_float(strength)
+    if is_concrete(strength) and np.any(np.asarray(strength) < 0):
+        raise ValueError(f"a window's strength must be at least 0, got {strength}")
+    strength = strength[..., None]
     squared = ((degrees(degree) * (degrees(degree) + 1.0)) ** 2).astype(strength.dtype)
     strength, squared = align(strength, jnp.asarray(squared))
     # The mean is set apart: an infinite strength times its zero would be no number.

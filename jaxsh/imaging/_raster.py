@@ -2,6 +2,8 @@
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxsh.geometry import Mesh, RayScene
@@ -47,8 +49,15 @@ def interpolate(
     Has the dtype of `values`. Differentiable, forward and reverse, in `values`, `background` and
     the raster's weights; `jit` and `vmap` as you like.
     """
+    if values.ndim != 2:
+        raise ValueError(f"expected values (v, c), one row per vertex, got shape {values.shape}")
+    if not isinstance(faces, Tracer) and len(faces):
+        vertices = int(np.max(np.asarray(faces))) + 1
+        if vertices > len(values):
+            raise ValueError(f"expected values for {vertices} vertices, got {len(values)}")
     # The background's -1 would be the last face: its weights are zero, and its colour is replaced.
     corners = values[faces[jnp.maximum(raster.face, 0)]]
-    pixels = jnp.einsum("hwkc,hwk->hwc", corners, raster.barycentric.astype(values.dtype))
+    weights = raster.barycentric.astype(values.dtype)
+    pixels = jnp.einsum("hwkc,hwk->hwc", corners, weights, precision="highest")
     behind = jnp.broadcast_to(jnp.asarray(background, values.dtype), pixels.shape)
     return jnp.where(raster.mask[..., None], pixels, behind)

@@ -14,7 +14,7 @@ from jaxtyping import Array, ArrayLike, Float
 from ..harmonics import degree_of, degrees, index, legendre, orders
 from ..harmonics._checks import as_float
 from ..harmonics._indexing import check_degree
-from ._quadrature import fejer_weights
+from ._quadrature import check_size, fejer_weights
 
 
 def project_lat_long(image: Float[ArrayLike, "h w c"], degree: int) -> Float[Array, "c k"]:
@@ -49,8 +49,7 @@ def reconstruct_lat_long(
     coefficients = as_float(coefficients)
     if coefficients.ndim != 2:
         raise ValueError(f"expected coefficients (channels, K), got shape {coefficients.shape}")
-    if min(height, width) < 1:
-        raise ValueError(f"height and width must be at least 1, got {height} and {width}")
+    height, width = check_size("height", height), check_size("width", width)
     return _reconstruct(coefficients, height, width)
 
 

@@ -16,6 +16,13 @@ class Quadrature(eqx.Module):
     directions: Float[Array, "n 3"] = eqx.field(converter=jnp.asarray)
     weights: Float[Array, " n"] = eqx.field(converter=jnp.asarray)
 
+    def __check_init__(self):
+        if self.weights.ndim != 1 or self.directions.shape != (*self.weights.shape, 3):
+            raise ValueError(
+                f"expected directions (N, 3) and weights (N,), got shapes "
+                f"{self.directions.shape} and {self.weights.shape}"
+            )
+
 
 def gauss_legendre(degree: int) -> Quadrature:
     """Exact for polynomials of `degree`: products of harmonics whose degrees sum up to it.
@@ -23,7 +30,7 @@ def gauss_legendre(degree: int) -> Quadrature:
     Gauss–Legendre in cos θ and degree + 1 equal steps in φ, about degree²/2 directions: the
     fewest of the quadratures here. To project a function of degree L onto degree L take 2L.
     """
-    grid = exact_grid(_size("degree", degree, least=0), 0)
+    grid = exact_grid(check_size("degree", degree, least=0), 0)
     return _quadrature(grid.directions, grid.weights)
 
 
@@ -33,7 +40,7 @@ def fibonacci(count: int) -> Quadrature:
     Not exact for any degree. The error falls about as count^-3/2 for smooth functions and as
     count^-3/4 for those with edges, where an exact quadrature is no better.
     """
-    n = np.arange(_size("count", count))
+    n = np.arange(check_size("count", count))
     golden = (1 + np.sqrt(5)) / 2
     z, phi = 1 - (2 * n + 1) / count, 2 * np.pi * n / golden
     radius = np.sqrt(1 - z**2)
@@ -49,7 +56,7 @@ def cube_map(resolution: int) -> Quadrature:
     Exact for functions that are constant on each texel; otherwise the error falls as
     resolution^-2.
     """
-    edge = np.linspace(-1, 1, _size("resolution", resolution) + 1)
+    edge = np.linspace(-1, 1, check_size("resolution", resolution) + 1)
     centre = (edge[1:] + edge[:-1]) / 2
     # The integral of (1 + u² + v²)^-3/2 over [0, a] × [0, b] is atan(ab/√(1 + a² + b²)).
     corner = np.arctan2(np.multiply.outer(edge, edge), np.sqrt(1 + np.add.outer(edge**2, edge**2)))
@@ -76,8 +83,8 @@ def lat_long(height: int, width: int) -> Quadrature:
     weights the rows integrate polynomials in cos θ exactly. At 256 rows they differ from the
     pixels' solid angles by 13 % in the row at a pole and by under 2e-4 from the 20th row on.
     """
-    theta = (np.arange(_size("height", height)) + 0.5) * np.pi / height
-    phi = (np.arange(_size("width", width)) + 0.5) * 2 * np.pi / width
+    theta = (np.arange(check_size("height", height)) + 0.5) * np.pi / height
+    phi = (np.arange(check_size("width", width)) + 0.5) * 2 * np.pi / width
     theta, phi = np.meshgrid(theta, phi, indexing="ij")
     sin_theta = np.sin(theta)
     directions = np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta)], -1)
@@ -102,7 +109,7 @@ def _quadrature(directions: np.ndarray, weights: np.ndarray) -> Quadrature:
     return Quadrature(jnp.asarray(directions, dtype), jnp.asarray(weights, dtype))
 
 
-def _size(name: str, value: int, least: int = 1) -> int:
+def check_size(name: str, value: int, least: int = 1) -> int:
     try:
         size = operator.index(value)
     except TypeError:

@@ -255,3 +255,12 @@ def test_dering_refuses_what_is_no_function(unchecked):
     for bad, count in ((np.ones(8), 8), (1.0, 0)):
         with pytest.raises(ValueError, match=rf"1, 4, 9, 16.*got {count}"):
             harmonics.dering(bad)
+
+
+def test_dering_of_nan_is_nan():
+    assert np.isnan(harmonics.dering(np.full(9, np.nan))[1])
+
+
+def test_damping_refuses_a_negative_strength():
+    with pytest.raises(ValueError, match=r"at least 0, got -0\.25"):
+        harmonics.damping(-0.25, 1)

@@ -201,3 +201,12 @@ def test_interpolation_compiles_batches_and_differentiates(sheet, rng, dtype):
     gradient = jax.grad(lambda v: draw(v, behind).sum())(batch[0])
     np.testing.assert_allclose(gradient.sum(), 3 * int(raster.mask.sum()), rtol=1e-6)
     assert jax.grad(lambda b: draw(batch[0], b).sum())(behind)[0] == int((~raster.mask).sum())
+
+
+def test_interpolation_refuses_values_of_another_mesh(unchecked):
+    mesh = knot(400)
+    raster = rasterize(mesh, Camera.facing(mesh, width=8, height=8))
+    with pytest.raises(ValueError, match=rf"values for {len(mesh.vertices)} vertices, got 10"):
+        interpolate(raster, mesh.faces, jnp.zeros((10, 3)))
+    with pytest.raises(ValueError, match=r"values \(v, c\).*got shape"):
+        interpolate(raster, mesh.faces, jnp.zeros(len(mesh.vertices)))

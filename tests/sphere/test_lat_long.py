@@ -172,5 +172,5 @@ def test_bad_input_is_refused(unchecked):
         sphere.reconstruct_lat_long(np.ones(9), 4, 8)
     with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got 8"):
         sphere.reconstruct_lat_long(np.ones((1, 8)), 4, 8)
-    with pytest.raises(ValueError, match="height and width must be at least 1, got 0 and 8"):
+    with pytest.raises(ValueError, match=r"height must be an integer >= 1, got 0"):
         sphere.reconstruct_lat_long(np.ones((1, 9)), 0, 8)
