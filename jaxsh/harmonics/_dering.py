@@ -27,9 +27,9 @@ def dering(
 
     What is left below zero is under 1e-3 of the mean, and mostly far under. A function without
     negative values is returned as it is, with strength 0; one whose mean is not positive cannot be
-    helped and keeps nothing but its mean, with strength infinity. Differentiable once, by the
-    implicit function theorem, with a kink where the strength reaches zero or the darkest direction
-    jumps; a second derivative raises `NotImplementedError`.
+    helped and keeps nothing but its mean, with strength infinity; NaN gives NaN. Differentiable
+    once, by the implicit function theorem, with a kink where the strength reaches zero or the
+    darkest direction jumps; a second derivative raises `NotImplementedError`.
     """
     coefficients = as_float(coefficients)
     degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
