@@ -70,10 +70,13 @@ def timings(degree: int, count: int, dtype, rounds: int) -> Iterator[dict[str, A
 
 
 def errors(degree: int) -> dict[str, Any]:
-    """Largest float32 error over directions, the axes among them, against SciPy in float64."""
+    """Largest float32 error over directions all around, dense near the poles, and along the axes,
+    against SciPy in float64."""
     generator = np.random.default_rng(1)
-    axes = np.concatenate([np.eye(3), -np.eye(3)])
-    vectors = np.concatenate([generator.normal(size=(5_000, 3)), axes])
+    around = generator.normal(size=(10_000, 3))
+    polar = generator.normal(size=(10_000, 3))
+    polar[:, :2] *= 10 ** generator.uniform(-3, 0, (10_000, 1))
+    vectors = np.concatenate([around, polar, np.eye(3), -np.eye(3)])
     vectors = (vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)).astype(np.float32)
     exact = _peers.scipy_values(vectors, degree)
     rivals = {

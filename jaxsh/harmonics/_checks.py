@@ -3,6 +3,7 @@
 import math
 
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
@@ -29,6 +30,15 @@ def align(*arrays: Array) -> tuple[Array, ...]:
     """
     ndim = max(array.ndim for array in arrays)
     return tuple(array.reshape((1,) * (ndim - array.ndim) + array.shape) for array in arrays)
+
+
+def check_batches(**shapes: tuple[int, ...]) -> None:
+    """Raises `ValueError` unless the leading axes of all arrays, named for the user, broadcast."""
+    try:
+        np.broadcast_shapes(*(shape[:-1] for shape in shapes.values()))
+    except ValueError:
+        said = " and ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise ValueError(f"leading axes must broadcast, got {said}") from None
 
 
 def flatten_batch(array: Float[Array, "*batch n"]) -> Float[Array, "rows n"]:

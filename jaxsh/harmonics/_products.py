@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ._checks import align, as_float, flatten_batch
+from ._checks import align, as_float, check_batches, flatten_batch
 from ._grid import exact_grid
 from ._indexing import check_degree, degree_of, num_coefficients
 
@@ -37,9 +37,11 @@ def product(
 
     f·g has the degrees of f and g together: asked for that degree the product is exact, below it
     is the exact product's projection. Batches broadcast; the degrees of f and g may differ.
-    Bilinear and differentiable. Raises `ValueError` unless K is a square.
+    Bilinear and differentiable. Raises `ValueError` where K is not a square or batches do not
+    broadcast.
     """
     f, g, f_degree, g_degree = _checked_pair(f, g)
+    check_batches(f=f.shape, g=g.shape)
     degree = max(f_degree, g_degree) if degree is None else check_degree(degree)
     return _product(f, g, degree)
 
@@ -52,6 +54,7 @@ def triple_integral(
     """∫ f g h dω = Σ_ijk G_ijk f_i g_j h_k, for functions of any degrees. Batches broadcast."""
     f, g, *_ = _checked_pair(f, g)
     g, h, _, h_degree = _checked_pair(g, h)
+    check_batches(f=f.shape, g=g.shape, h=h.shape)
     f = f.astype(h.dtype)
     return jnp.sum(jnp.multiply(*align(_product(f, g, h_degree), h)), axis=-1)
 

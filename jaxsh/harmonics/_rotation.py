@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from ._basis import evaluate
-from ._checks import align, as_float, is_concrete
+from ._checks import align, as_float, check_batches, is_concrete
 from ._grid import even_grid
 from ._indexing import check_degree, degree_of, degrees, orders
 
@@ -41,7 +41,9 @@ def rotate(
     """
     coefficients = as_float(coefficients)
     degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
-    matrix = _rotation_matrix(_checked_rotation(rotation).astype(coefficients.dtype), degree)
+    rotation = _checked_rotation(rotation).astype(coefficients.dtype)
+    check_batches(coefficients=coefficients.shape, rotation=rotation.shape[:-1])
+    matrix = _rotation_matrix(rotation, degree)
     if matrix.ndim == 2:
         return jnp.matmul(coefficients, matrix.T, precision="highest")
     return jnp.einsum("...ij,...j->...i", matrix, coefficients, precision="highest")
@@ -60,6 +62,7 @@ def rotate_z(
     m = orders(degree)
     mirrored = coefficients[..., np.arange(len(m), dtype=np.int32) - 2 * m]
     phase = jnp.asarray(angle, coefficients.dtype)[..., None]
+    check_batches(coefficients=coefficients.shape, angle=phase.shape)
     phase = jnp.multiply(*align(phase, jnp.asarray(m, phase.dtype)))
     coefficients, mirrored, phase = align(coefficients, mirrored, phase)
     return jnp.cos(phase) * coefficients - jnp.sin(phase) * mirrored

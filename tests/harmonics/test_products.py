@@ -187,3 +187,11 @@ def test_bad_input_is_refused(unchecked):
     for call in (harmonics.product_matrix, lambda f, d: harmonics.product(f, f, d)):
         with pytest.raises(ValueError, match=r"degree must be an integer >= 0.*got -1"):
             call(good, -1)
+
+
+def test_batches_that_do_not_broadcast_are_refused(unchecked):
+    two, three = np.zeros((2, 4)), np.zeros((3, 4))
+    with pytest.raises(ValueError, match=r"must broadcast, got f \(2, 4\) and g \(3, 4\)"):
+        harmonics.product(two, three)
+    with pytest.raises(ValueError, match=r"must broadcast, got f .* and g .* and h \(3, 4\)"):
+        harmonics.triple_integral(two, two, three)

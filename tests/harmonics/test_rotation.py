@@ -205,3 +205,11 @@ def test_bad_rotations_are_refused(unchecked):
         harmonics.rotate_z(np.ones(8), 1.0)
     with pytest.raises(ValueError, match="got 0"):
         harmonics.rotate(1.0, np.eye(3))
+
+
+def test_batches_that_do_not_broadcast_are_refused(unchecked):
+    two, turns = np.zeros((2, 4)), np.stack([np.eye(3)] * 3)
+    with pytest.raises(ValueError, match=r"coefficients \(2, 4\) and rotation \(3, 3\)"):
+        harmonics.rotate(two, turns)
+    with pytest.raises(ValueError, match=r"coefficients \(2, 4\) and angle \(3, 1\)"):
+        harmonics.rotate_z(two, np.zeros(3))
