@@ -35,16 +35,23 @@ class RayScene:
     """Meshes in an Embree scene, to be asked which rays they stop.
 
     Takes one `Mesh` or a sequence of them; a later change of a mesh is not seen. Faces stop rays
-    from both sides. Watertight at edges and vertices (Embree's robust mode). Positions,
-    directions and distances are float32 within.
+    from both sides. In Embree's robust mode, which still lets a very few rays slip through exactly
+    at an edge or a vertex (`JaxRayScene` lets none). Positions, directions and distances are
+    float32 within.
 
     A ray that starts on a surface may hit it: start it a little off, along the normal.
     Answers do not depend on the number of threads or on how rays are cut into chunks.
     """
 
     def __init__(self, meshes: Mesh | Sequence[Mesh]):
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
+        try:
+            from embreex.mesh_construction import TriangleMesh
+            from embreex.rtcore_scene import EmbreeScene
+        except ImportError as error:
+            raise ImportError(
+                "RayScene needs embreex, which cannot be imported here: JaxRayScene answers the "
+                "same questions without it"
+            ) from error
 
         meshes = [meshes] if isinstance(meshes, Mesh) else list(meshes)
         if not meshes:
@@ -72,14 +79,7 @@ class RayScene:
         Raises `ValueError` for wrong shapes, NaN or infinite vectors, zero directions.
         """
         origins, directions = _paired(origins, directions)
-        if np.ndim(max_distance) not in (0, 1) or np.size(max_distance) not in (1, len(origins)):
-            raise ValueError(
-                f"max_distance must be a number or have shape ({len(origins)},), one for each "
-                f"ray, got shape {np.shape(max_distance)}"
-            )
-        if np.isnan(max_distance).any():
-            raise ValueError("max_distance holds NaN")
-        limits = np.broadcast_to(np.asarray(max_distance, np.float32), len(origins))
+        limits = _limits(max_distance, len(origins))
         result = np.empty(len(origins), bool)
 
         def run(part: slice) -> None:
@@ -143,6 +143,18 @@ def _paired(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:
     count = counts.pop() if counts else 1
     starts, towards = (np.broadcast_to(array, (count, 3)) for array in arrays.values())
     return starts, towards
+
+
+def _limits(max_distance: Any, count: int) -> np.ndarray:
+    """One float32 limit for each ray; one that all share is repeated without a copy."""
+    if np.ndim(max_distance) not in (0, 1) or np.size(max_distance) not in (1, count):
+        raise ValueError(
+            f"max_distance must be a number or have shape ({count},), one for each ray, "
+            f"got shape {np.shape(max_distance)}"
+        )
+    if np.isnan(max_distance).any():
+        raise ValueError("max_distance holds NaN")
+    return np.broadcast_to(np.asarray(max_distance, np.float32), count)
 
 
 def _prepared(

@@ -1,0 +1,94 @@
+"""Ray casting without Embree: the same questions, answered by JAX."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from ._mesh import Mesh
+from ._rays import Hit, Vectors, _limits, _paired, _prepared
+from ._trace import Trace, trace
+from ._tree import RayTree, ray_tree
+
+# Lanes on a CPU fit its cache; an accelerator wants many more.
+_LANES = {"cpu": 2048}
+_MANY_LANES = 32_768
+# Rays in a chunk, for each lane: the last rays of a chunk leave lanes idle.
+_CHUNK = 32
+
+
+class JaxRayScene:
+    """`RayScene` without Embree: the same questions and answers, on any device that JAX has.
+
+    Takes one `Mesh` or a sequence of them; a later change of a mesh is not seen. Faces stop rays
+    from both sides. Watertight at edges and vertices. Positions, directions and distances are
+    float32 within, and agree with Embree's to rounding; a ray through an edge may name either of
+    its faces.
+
+    On a CPU slower than Embree, which is made for it. The first query compiles, once for each
+    power of two of the number of faces; no number of rays compiles anew. Memory is bounded, for
+    rays pass in chunks. `tree` is what `trace` takes, for rays cast inside `jit`.
+    """
+
+    tree: RayTree
+
+    def __init__(self, meshes: Mesh | Sequence[Mesh]):
+        meshes = [meshes] if isinstance(meshes, Mesh) else list(meshes)
+        if not meshes:
+            raise ValueError("JaxRayScene needs at least one mesh, got an empty sequence")
+        self.tree = ray_tree(meshes)
+        self._starts = np.cumsum([0] + [len(mesh.faces) for mesh in meshes])
+
+    def occluded(
+        self,
+        origins: Vectors,
+        directions: Vectors,
+        max_distance: float | Float[Array | np.ndarray, " n"] = math.inf,
+    ) -> Bool[np.ndarray, " n"]:
+        """Whether anything lies on the ray within `max_distance` of its origin.
+
+        Arguments and errors as for `RayScene.occluded`.
+        """
+        origins, directions = _paired(origins, directions)
+        limits = _limits(max_distance, len(origins))
+        result = np.empty(len(origins), bool)
+        for part, (_, triangle, _) in self._each_chunk(origins, directions, limits, first=False):
+            result[part] = triangle >= 0
+        return result
+
+    def closest_hit(self, origins: Vectors, directions: Vectors) -> Hit:
+        """The first surface that each ray meets. Arguments and errors as for `occluded`."""
+        origins, directions = _paired(origins, directions)
+        count = len(origins)
+        limits = np.broadcast_to(np.float32(np.inf), count)
+        triangle = np.empty(count, np.int32)
+        distance, weights = np.empty(count, np.float32), np.empty((count, 3), np.float32)
+        for part, found in self._each_chunk(origins, directions, limits, first=True):
+            distance[part], triangle[part], weights[part] = found
+        mesh = np.searchsorted(self._starts, triangle, side="right").astype(np.int32) - 1
+        face = np.where(mesh >= 0, triangle - self._starts[mesh], -1).astype(np.int32)
+        return Hit(distance, mesh, face, weights)
+
+    def _each_chunk(
+        self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, *, first: bool
+    ) -> Iterator[tuple[slice, tuple[np.ndarray, ...]]]:
+        """Cast rays in chunks of one size, and give what those of each met."""
+        lanes = _LANES.get(jax.default_backend(), _MANY_LANES)
+        size = lanes * _CHUNK
+        padded = [np.zeros(shape, np.float32) for shape in ((size, 3), (size, 3), size)]
+        for start in range(0, len(origins), size):
+            part = slice(start, min(start + size, len(origins)))
+            count = part.stop - start
+            rays = *_prepared(origins, directions, part), limits[part]
+            for array, values in zip(padded, rays, strict=True):
+                array[:count] = values
+            found = _trace(
+                self.tree, *map(jnp.asarray, padded), first=first, count=count, lanes=lanes
+            )
+            yield part, tuple(np.asarray(array)[:count] for array in found)
+
+
+_trace: Callable[..., Trace] = jax.jit(trace, static_argnames="lanes")

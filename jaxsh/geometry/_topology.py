@@ -1,0 +1,133 @@
+"""What a mesh is as a surface: its pieces, its rims, and where it is no surface."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._mesh import Mesh
+
+
+class Topology(NamedTuple):
+    """Counts of what a mesh is made of; `str` says them in one sentence.
+
+    An edge is on the boundary where one face has it, and non-manifold where more than two do. A
+    vertex is non-manifold where the faces around it form more than one fan, as at the tip of two
+    cones. Winding is inconsistent at an edge that its two faces run along in the same direction.
+    Loops of the boundary that meet at a non-manifold edge count as one.
+    """
+
+    vertices: int  # those in a face
+    edges: int
+    faces: int
+    components: int  # pieces that share no vertex
+    boundary_edges: int
+    boundary_loops: int
+    nonmanifold_edges: int
+    nonmanifold_vertices: int
+    inconsistent_edges: int
+
+    @property
+    def euler(self) -> int:
+        """The Euler characteristic: vertices − edges + faces."""
+        return self.vertices - self.edges + self.faces
+
+    @property
+    def closed(self) -> bool:
+        """Whether no edge is on the boundary."""
+        return self.boundary_edges == 0
+
+    @property
+    def manifold(self) -> bool:
+        """Whether it is everywhere a surface, with or without boundary."""
+        return self.nonmanifold_edges == 0 and self.nonmanifold_vertices == 0
+
+    @property
+    def genus(self) -> int | None:
+        """The handles of all components; None where it is no consistently wound manifold."""
+        if not self.manifold or self.inconsistent_edges:
+            return None
+        return self.components - (self.euler + self.boundary_loops) // 2
+
+    def __str__(self) -> str:
+        faults = [
+            (self.nonmanifold_edges, "non-manifold edge"),
+            (self.nonmanifold_vertices, "non-manifold vertex"),
+            (self.inconsistent_edges, "edge with inconsistent winding"),
+        ]
+        rim = f"open along {self.boundary_edges:,} edges in {_many(self.boundary_loops, 'loop')}"
+        return ", ".join(
+            [
+                f"{_many(self.vertices, 'vertex')} and {_many(self.faces, 'face')}"
+                f" in {_many(self.components, 'piece')}",
+                "closed" if self.closed else rim,
+                *([f"genus {self.genus}"] if self.genus is not None else []),
+                *(_many(count, what) for count, what in faults if count),
+            ]
+        )
+
+
+def topology(mesh: Mesh) -> Topology:
+    """Count the boundary, the pieces and the faults of a mesh.
+
+    Nothing else in `geometry` looks: an open mesh is as good as a closed one to cast rays at, and
+    a non-manifold one has normals and neighbours too. Faces that name a vertex twice are left
+    out. Not differentiable, and not under `jit`: the answer is Python numbers.
+    """
+    faces = np.asarray(mesh.faces, np.int64)
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    corner = np.arange(faces.size)  # which also names the half-edge that leaves it
+    ahead = np.roll(corner.reshape(-1, 3), -1, axis=1).ravel()
+
+    # Half-edges of one edge stand together when sorted, and each is paired with the one before.
+    size = len(mesh.vertices)
+    key = np.minimum(start, end) * size + np.maximum(start, end)
+    order = np.argsort(key)
+    _, first, sharing = np.unique(key[order], return_index=True, return_counts=True)
+    later = np.setdiff1d(corner, first, assume_unique=True)
+    one, two = order[later - 1], order[later]
+    pairs = order[first[sharing == 2]], order[first[sharing == 2] + 1]
+
+    # Faces that share an edge share a fan around either of its ends.
+    same_way = start[one] == start[two]
+    beside = np.where(same_way, two, ahead[two]), np.where(same_way, ahead[two], two)
+    fans, fan = _groups(
+        np.concatenate([one, ahead[one]]), np.concatenate(beside), number=faces.size
+    )
+    used, at = np.unique(start, return_inverse=True)
+    vertex_of_fan = np.empty(fans, np.int64)
+    vertex_of_fan[fan] = at
+
+    # A rim passes from one boundary edge to the next within a fan.
+    rim = order[first[sharing == 1]]
+    ends = np.unique(np.concatenate([fan[rim], fan[ahead[rim]]]), return_inverse=True)
+    loops, _ = _groups(*ends[1].reshape(2, -1), number=len(ends[0]))
+    return Topology(
+        vertices=len(used),
+        edges=len(first),
+        faces=len(faces),
+        components=_groups(at, at[ahead], number=len(used))[0],
+        boundary_edges=len(rim),
+        boundary_loops=loops,
+        nonmanifold_edges=int((sharing > 2).sum()),
+        nonmanifold_vertices=int((np.bincount(vertex_of_fan) > 1).sum()),
+        inconsistent_edges=int((start[pairs[0]] == start[pairs[1]]).sum()),
+    )
+
+
+def _groups(one: np.ndarray, two: np.ndarray, *, number: int) -> tuple[int, np.ndarray]:
+    """How many groups links between `number` things make of them, and the group of each thing."""
+    from scipy.sparse import coo_array, csgraph  # JAX itself needs SciPy
+
+    links = coo_array((np.ones(len(one), np.int8), (one, two)), shape=(number, number))
+    groups, labels = csgraph.connected_components(links, directed=False)
+    return int(groups), labels
+
+
+def _many(count: int, what: str) -> str:
+    """The count with its noun, in the plural where it wants one."""
+    if count != 1:
+        noun, *rest = what.split(" with ")
+        noun = noun[:-2] + "ices" if noun.endswith("vertex") else noun + "s"
+        what = " with ".join([noun, *rest])
+    return f"{count:,} {what}"
