@@ -20,6 +20,20 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 }
 
 
+# Every statement of the format (Wavefront's appendix B1): a damaged "f" must not pass for another.
+_OBJ_STATEMENTS = re.compile(
+    "v|vt|vn|vp|deg|bmat|step|cstype|p|l|f|curv|curv2|surf|parm|trim|hole|scrv|sp|end|con|g|s|mg|o|"
+    "bevel|c_interp|d_interp|lod|usemap|maplib|usemtl|mtllib|shadow_obj|trace_obj|ctech|stech|"
+    "bsp|bzp|cdc|cdp|res|call|csh"
+)
+# One facet of a text STL: a number too many here and one too few there would shift all between.
+_STL_NUMBER = rb"\s+(?:[-+.\de]+|[-+]?nan|[-+]?inf)"
+_STL_FACET = re.compile(
+    rb"facet\s+normal(?:%(n)s){3}\s+outer\s+loop(?:\s+vertex(?:%(n)s){3}){3}\s+endloop\s+endfacet\s"
+    % {b"n": _STL_NUMBER}
+)
+
+
 def read_mesh(path: str | os.PathLike[str], *, up: Literal["z", "y"] = "z") -> Mesh:
     """Read a PLY, OBJ, OFF, STL or GLB file into one `Mesh`.
 
@@ -88,6 +102,8 @@ def _plain_obj(data: bytes) -> bytes:
     lines, count = [], 0
     for number, line in enumerate(text.splitlines(), start=1):
         key, *words = line.split("#")[0].split() or [""]
+        if key and not _OBJ_STATEMENTS.fullmatch(key):
+            raise ValueError(f"line {number} begins with {key!r}, which is no statement")
         if key not in ("v", "f"):
             continue
         if len(words) < 3:
@@ -120,11 +136,7 @@ def _announced(data: bytes, suffix: str) -> tuple[int, int] | None:
         case ".stl":
             facets = int.from_bytes(data[80:84], "little")
             if len(data) != 84 + 50 * facets:  # not binary
-                facets = len(re.findall(rb"outer\s+loop", data.lower()))
-                if facets == 0:
-                    raise ValueError("it is neither text nor as long as its number of facets")
-                if b"endsolid" not in data.lower():
-                    raise ValueError("it breaks off before endsolid")
+                facets = _text_facets(data.lower())
             return 3 * facets, facets
         case ".off":
             lines = [line.split(b"#")[0].split() for line in data.splitlines()]
@@ -145,6 +157,19 @@ def _announced(data: bytes, suffix: str) -> tuple[int, int] | None:
                 )
             return int(elements[b"vertex"]), int(elements.get(b"face", 0))
     return None
+
+
+def _text_facets(data: bytes) -> int:
+    """How many facets a text STL, in lower case, holds, if it holds nothing else."""
+    rest, facets = _STL_FACET.subn(b"", re.sub(rb"(?m)^[ \t]*(?:end)?solid\b.*$", b"", data))
+    if b"facet" not in data:
+        raise ValueError("it is neither text nor as long as its number of facets")
+    if b"endsolid" not in data:
+        raise ValueError("it breaks off before endsolid")
+    if rest.strip():
+        odd = rest.strip().splitlines()[0][:60].decode(errors="replace")
+        raise ValueError(f"its facets are damaged, first at {odd!r}")
+    return facets
 
 
 def _check_lines(found: int, announced: int) -> None:

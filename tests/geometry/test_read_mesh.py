@@ -133,6 +133,7 @@ def test_unknown_up(unchecked, tmp_path):
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n", "line 4 has 2 values after 'f'"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n", "line 4 names vertex -4"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "damaged"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nF 3 2 1\n", "line 5 begins with 'F'"),
         ("a.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "announces 6 lines .* has 5"),
         ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\n", "breaks off before endsolid"),
         ("a.ply", "ply\nformat ascii 1.0\nelement vertex 3\n", "its header is not whole"),
@@ -162,6 +163,23 @@ def test_polygons_cut_off_in_ascii(tmp_path):
     path.write_text("\n".join(lines[:-2]) + "\n")
     with pytest.raises(ValueError, match="announces 13 lines of data, but has 11"):
         read_mesh(path)
+
+
+def test_numbers_that_shift_in_a_text_stl(tmp_path):
+    """One number too many and a later one too few keep the count, and would move all between."""
+    path = tmp_path / "shift.stl"
+    lines = encoded("ascii.stl").decode().splitlines()
+    vertices = [i for i, line in enumerate(lines) if line.strip().startswith("vertex")]
+    for change in ("append", "prefix"):
+        shifted = list(lines)
+        shifted[vertices[1]] += " 0.5"
+        words = shifted[vertices[7]].split()
+        shifted[vertices[7]] = " ".join(
+            words[:-1] if change == "append" else [words[0], *words[2:]]
+        )
+        path.write_text("\n".join(shifted))
+        with pytest.raises(ValueError, match=r"shift\.stl: .*facets are damaged, first at 'facet"):
+            read_mesh(path)
 
 
 @pytest.mark.parametrize("name", [n for n in FILES if n != "plain.obj"])
