@@ -5,6 +5,7 @@ and nowhere else. Pictures are (height, width, channels), row 0 on top. What mak
 numbers differentiates; what touches files or casts rays does not.
 """
 
+from ._backdrop import backdrop, look_up
 from ._camera import Camera
 from ._compare import psnr
 from ._display import auto_exposure, srgb_decode, srgb_encode, tone_map
@@ -17,7 +18,9 @@ __all__ = [
     "Camera",
     "Raster",
     "auto_exposure",
+    "backdrop",
     "interpolate",
+    "look_up",
     "psnr",
     "rasterize",
     "read_environment",

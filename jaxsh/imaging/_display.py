@@ -1,7 +1,13 @@
 """From linear radiance to what a screen shows."""
 
+import math
+from typing import Literal
+
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
+
+_LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec. 709
 
 
 def srgb_encode(linear: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
@@ -23,13 +29,44 @@ def srgb_decode(signal: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
 
 
 def tone_map(
-    image: Float[Array, "*shape"], exposure: float | Float[Array, ""] = 1.0
+    image: Float[Array, "*shape"],
+    exposure: float | Float[Array, ""] = 1.0,
+    *,
+    curve: Literal["clip", "reinhard"] = "clip",
+    white: float | Float[Array, ""] = math.inf,
 ) -> Float[Array, "*shape"]:
-    """Linear radiance, times `exposure`, clipped to [0, 1] and encoded as sRGB.
+    """Linear radiance, times `exposure`, through a curve to [0, 1] and encoded as sRGB.
 
-    Differentiable in both; the gradient is zero where the result is clipped.
+    "clip" cuts at 1. "reinhard" takes the exposed luminance L (Rec. 709) to L (1 + L/white²) /
+    (1 + L) and keeps the ratios of R, G, B, which are in the last axis; `white` is the least
+    luminance that becomes 1, and with the default, infinity, none does (Reinhard et al. 2002,
+    eq. 4 and 3, without the paper's scaling to the picture's key: that is `exposure`). What is
+    still outside [0, 1], as a saturated colour may be, is clipped, negative light before the curve.
+
+    Differentiable in image, exposure and white; the gradient is zero where the result is clipped.
+    Raises `ValueError` for an unknown curve, a last axis that is not R, G, B, and, where it is
+    concrete, a white that is not above 0.
     """
-    return srgb_encode(jnp.clip(image * jnp.asarray(exposure, image.dtype), 0, 1))
+    exposed = image * jnp.asarray(exposure, image.dtype)
+    if curve == "reinhard":
+        exposed = _reinhard(exposed, white)
+    elif curve != "clip":
+        raise ValueError(f'curve must be "clip" or "reinhard", got {curve!r}')
+    return srgb_encode(jnp.clip(exposed, 0, 1))
+
+
+def _reinhard(
+    image: Float[Array, "*shape"], white: float | Float[Array, ""]
+) -> Float[Array, "*shape"]:
+    if image.shape[-1:] != (3,):
+        raise ValueError(f"a luminance needs R, G, B in the last axis, got shape {image.shape}")
+    if not isinstance(white, Tracer) and not white > 0:
+        raise ValueError(f"white must be above 0, got {white}")
+    image = jnp.maximum(image, 0)
+    weights = jnp.asarray(_LUMINANCE, image.dtype)
+    luminance = jnp.einsum("...c,c->...", image, weights, precision="highest")[..., None]
+    white = jnp.asarray(white, image.dtype)
+    return image * ((1 + luminance / white / white) / (1 + luminance))
 
 
 def auto_exposure(

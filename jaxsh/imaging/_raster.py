@@ -1,6 +1,10 @@
 """Which face a pixel sees, and colours from vertices to pixels."""
 
+import dataclasses
+import operator
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -14,27 +18,49 @@ _rays = eqx.filter_jit(Camera.rays)
 
 
 class Raster(eqx.Module):
-    """What each pixel's centre sees of a mesh."""
+    """What the samples of each pixel see of a mesh: n × n of them, for a picture of h × w.
 
-    face: Int[Array, "h w"]  # index into the mesh's faces, -1 for background; int32
-    barycentric: Float[Array, "h w 3"]  # weights of the face's vertices, 0 for background; float32
+    With one sample, its pixel's centre, the rows and columns are those of the picture.
+    """
+
+    face: Int[Array, "hn wn"]  # index into the mesh's faces, -1 for background; int32
+    barycentric: Float[Array, "hn wn 3"]  # of the face's vertices, 0 for background; float32
+    samples: int = eqx.field(static=True, default=1)  # n
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the picture."""
+        height, width = self.face.shape
+        return height // self.samples, width // self.samples
+
+    @property
+    def alpha(self) -> Float[Array, "h w"]:
+        """The share of a pixel's samples that are on the object; float32."""
+        return _resolve((self.face >= 0).astype(jnp.float32)[..., None], self.samples)[..., 0]
 
     @property
     def mask(self) -> Bool[Array, "h w"]:
-        """True on the object."""
-        return self.face >= 0
+        """True where the whole pixel is on the object."""
+        return self.alpha == 1
 
 
-def rasterize(mesh: Mesh, camera: Camera) -> Raster:
-    """The first face on the ray through each pixel centre, and where on it the ray arrives.
+def rasterize(mesh: Mesh, camera: Camera, *, samples: int = 1) -> Raster:
+    """The first face on the rays through each pixel, and where on it they arrive.
 
-    Exact at the pixel centre (weights are those in space, so perspective is right), without
-    antialiasing. Runs on the CPU through `RayScene`: neither traceable nor differentiable.
+    `samples` rays along each side of a pixel, on a regular grid: one is its centre, n give pictures
+    n² + 1 shades of a silhouette and take n² times the memory. Exact at the samples (weights are
+    those in space, so perspective is right). Runs on the CPU through `RayScene`: neither traceable
+    nor differentiable. Raises `ValueError` for samples below 1.
     """
-    hit = RayScene(mesh).closest_hit(*_rays(camera))
-    shape = (camera.height, camera.width)
+    if operator.index(samples) < 1:
+        raise ValueError(f"a pixel needs at least 1 sample along its side, got {samples}")
+    shape = (camera.height * samples, camera.width * samples)
+    finer = dataclasses.replace(camera, height=shape[0], width=shape[1])
+    hit = RayScene(mesh).closest_hit(*_rays(finer))
     return Raster(
-        jnp.asarray(hit.face.reshape(shape)), jnp.asarray(hit.barycentric.reshape(*shape, 3))
+        jnp.asarray(hit.face.reshape(shape)),
+        jnp.asarray(hit.barycentric.reshape(*shape, 3)),
+        samples,
     )
 
 
@@ -42,12 +68,14 @@ def interpolate(
     raster: Raster,
     faces: Int[Array, "f 3"],
     values: Float[Array, "v c"],
-    background: float | Float[Array, " c"] = 0.0,
+    background: float | Float[Array, " c"] | Float[Array, "h w c"] = 0.0,
 ) -> Float[Array, "h w c"]:
     """Values at vertices (colours, positions, normals) carried linearly over the faces to pixels.
 
-    Has the dtype of `values`. Differentiable, forward and reverse, in `values`, `background` and
-    the raster's weights; `jit` and `vmap` as you like.
+    A pixel is the mean over its samples; those beside the object count as `background`, a number,
+    a colour or a picture (as from `backdrop`). Give linear radiance: a mean of encoded colours is
+    no light. Has the dtype of `values`. Differentiable, forward and reverse, in `values`,
+    `background` and the raster's weights; `jit` and `vmap` as you like.
     """
     if values.ndim != 2:
         raise ValueError(f"expected values (v, c), one row per vertex, got shape {values.shape}")
@@ -55,9 +83,27 @@ def interpolate(
         vertices = int(np.max(np.asarray(faces))) + 1
         if vertices > len(values):
             raise ValueError(f"expected values for {vertices} vertices, got {len(values)}")
-    # The background's -1 would be the last face: its weights are zero, and its colour is replaced.
+    behind = jnp.asarray(background, values.dtype)
+    shape = (*raster.shape, values.shape[1])
+    if behind.ndim > 1 and behind.shape != shape:
+        raise ValueError(f"expected a background {shape}, got shape {behind.shape}")
+    return _interpolate(raster, faces, values, behind)
+
+
+@jax.jit
+def _interpolate(raster: Raster, faces, values, background):
+    # The background's -1 would be the last face, but its weights are zero.
     corners = values[faces[jnp.maximum(raster.face, 0)]]
     weights = raster.barycentric.astype(values.dtype)
-    pixels = jnp.einsum("hwkc,hwk->hwc", corners, weights, precision="highest")
-    behind = jnp.broadcast_to(jnp.asarray(background, values.dtype), pixels.shape)
-    return jnp.where(raster.mask[..., None], pixels, behind)
+    seen = jnp.einsum("hwkc,hwk->hwc", corners, weights, precision="highest")
+    seen = jnp.where((raster.face >= 0)[..., None], seen, 0)
+    pixels = _resolve(seen, raster.samples)
+    free = 1 - raster.alpha[..., None].astype(values.dtype)
+    # A background that is no number, as a mark, stays where it is seen.
+    return pixels + jnp.where(free > 0, free * jnp.broadcast_to(background, pixels.shape), 0)
+
+
+def _resolve(samples: Float[Array, "hn wn c"], n: int) -> Float[Array, "h w c"]:
+    """The mean of each n × n samples."""
+    height, width, channels = samples.shape
+    return jnp.mean(samples.reshape(height // n, n, width // n, n, channels), axis=(1, 3))

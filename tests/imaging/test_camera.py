@@ -210,3 +210,54 @@ def test_interpolation_refuses_values_of_another_mesh(unchecked):
         interpolate(raster, mesh.faces, jnp.zeros((10, 3)))
     with pytest.raises(ValueError, match=r"values \(v, c\).*got shape"):
         interpolate(raster, mesh.faces, jnp.zeros(len(mesh.vertices)))
+
+
+def test_more_samples_see_more_of_a_silhouette():
+    """The share of a disc in each pixel, against a count of many points."""
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    mesh = make_mesh(ball.vertices, ball.faces)
+    camera = Camera((0.0, -4.0, 0.0), (0.0, 0.0, 0.0), width=12, height=10)
+    truth = np.asarray(rasterize(mesh, camera, samples=16).alpha)
+    errors = []
+    for samples in (1, 2, 4):
+        raster = rasterize(mesh, camera, samples=samples)
+        assert raster.face.shape == (10 * samples, 12 * samples)
+        assert raster.alpha.shape == raster.mask.shape == (10, 12)
+        assert raster.alpha.dtype == jnp.float32
+        np.testing.assert_array_equal(raster.mask, np.asarray(raster.alpha) == 1)
+        errors.append(np.abs(raster.alpha - truth).max())
+    assert errors[0] > 0.3 > errors[1] > errors[2]
+    assert errors[2] < 0.1
+
+
+def test_samples_are_averaged_in_linear_light(sheet):
+    camera = Camera((0.3, -4.0, 0.2), (0.0, 0.0, 0.0), width=8, height=6)
+    finer = Camera((0.3, -4.0, 0.2), (0.0, 0.0, 0.0), width=24, height=18)
+    values = sheet.vertices.astype(jnp.float64)
+    background = jnp.array([5.0, 6, 7])
+    image = interpolate(rasterize(sheet, camera, samples=3), sheet.faces, values, background)
+    fine = interpolate(rasterize(sheet, finer), sheet.faces, values, background)
+    np.testing.assert_allclose(image, fine.reshape(6, 3, 8, 3, 3).mean(axis=(1, 3)), atol=1e-6)
+
+
+def test_background_may_be_a_picture_or_a_mark(sheet, rng, unchecked):
+    camera = Camera((0, -4, 0), (0, 0, 0), width=8, height=6)
+    raster = rasterize(sheet, camera, samples=2)
+    picture = jnp.asarray(rng.uniform(size=(6, 8, 3)), jnp.float32)
+    image = interpolate(raster, sheet.faces, jnp.zeros_like(sheet.vertices), picture)
+    np.testing.assert_allclose(image, (1 - raster.alpha[..., None]) * picture, atol=1e-7)
+    marked = interpolate(raster, sheet.faces, sheet.vertices, jnp.nan)
+    np.testing.assert_array_equal(np.isnan(marked[..., 0]), ~np.asarray(raster.mask))
+    gradient = jax.grad(lambda values: interpolate(raster, sheet.faces, values, picture).sum())(
+        sheet.vertices
+    )
+    np.testing.assert_allclose(gradient.sum(), 3 * float(raster.alpha.sum()), rtol=1e-5)
+    with pytest.raises(ValueError, match=r"expected a background \(6, 8, 3\), got .*\(8, 6, 3\)"):
+        interpolate(raster, sheet.faces, sheet.vertices, picture.transpose(1, 0, 2))
+
+
+def test_samples_must_be_there(sheet):
+    with pytest.raises(ValueError, match="at least 1 sample along its side, got 0"):
+        rasterize(sheet, Camera((0, -4, 0), (0, 0, 0)), samples=0)

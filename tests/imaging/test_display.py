@@ -65,6 +65,49 @@ def test_tone_map_exposes_then_clips_then_encodes(rng):
     )
 
 
+def test_reinhard_is_the_papers_curve_on_luminance(rng):
+    image = jnp.asarray(rng.uniform(0, 20, size=(5, 6, 3)))
+    luminance = np.asarray(image) @ np.array([0.2126, 0.7152, 0.0722]) * 0.3
+    for white in (2.0, 5.0, np.inf):
+        mapped = luminance * (1 + luminance / white**2) / (1 + luminance)
+        colour = np.asarray(image) * 0.3 * (mapped / luminance)[..., None]
+        found = tone_map(image, 0.3, curve="reinhard", white=white)
+        np.testing.assert_allclose(found, srgb_encode(jnp.clip(colour, 0, 1)), atol=1e-14)
+    # Grey: white is the least that becomes 1, and without one nothing does.
+    grey = jnp.broadcast_to(jnp.array([0.0, 0.5, 4.0, 1e30])[:, None], (4, 3))
+    found = srgb_decode(tone_map(grey, curve="reinhard", white=4.0))[:, 0]
+    np.testing.assert_allclose(found, [0, 0.5 * (1 + 0.5 / 16) / 1.5, 1, 1], rtol=1e-12)
+    found = srgb_decode(tone_map(grey, curve="reinhard"))[:, 0]
+    np.testing.assert_allclose(found, [0, 1 / 3, 0.8, 1], rtol=1e-12)
+
+
+def test_reinhard_differentiates_and_compiles(rng):
+    image = jnp.asarray(rng.uniform(0.05, 2, size=(2, 3, 3)))
+
+    def draw(image, exposure, white):
+        return tone_map(image, exposure, curve="reinhard", white=white)
+
+    arguments = (image, jnp.asarray(0.4), jnp.asarray(3.0))
+    check_grads(jax.jit(draw), arguments, 1, ("fwd", "rev"), atol=1e-6, rtol=1e-6)
+    draw = jax.jit(jax.value_and_grad(lambda i: tone_map(i, curve="reinhard").sum()))
+    for dtype in (jnp.float32, jnp.float64):
+        for x in (-1.0, 0.0, 1e-30, 1.0, 1e30):
+            value, slope = draw(jnp.full(3, x, dtype))
+            assert value.dtype == slope.dtype == dtype
+            assert 0 <= value <= 3
+            assert np.isfinite(slope).all()
+
+
+def test_bad_curves_are_refused(unchecked):
+    with pytest.raises(ValueError, match='curve must be "clip" or "reinhard", got \'aces\''):
+        tone_map(jnp.ones(3), curve="aces")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(ValueError, match=r"needs R, G, B in the last axis, got shape \(4, 1\)"):
+        tone_map(jnp.ones((4, 1)), curve="reinhard")
+    for white in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match=f"white must be above 0, got {white}"):
+            tone_map(jnp.ones(3), curve="reinhard", white=white)
+
+
 @DTYPES
 def test_auto_exposure_takes_the_percentile_of_the_object_to_one(rng, dtype):
     image = jnp.asarray(rng.uniform(0, 3, size=(30, 40, 3)), dtype)

@@ -137,22 +137,190 @@ def test_an_hdr_from_the_bottom_up_is_refused(tmp_path, picture):
 
 
 def test_bad_options_and_names(tmp_path):
-    with pytest.raises(ValueError, match=r"layout must be one of \('lat-long',\), got 'cross'"):
+    with pytest.raises(ValueError, match=r"layout must be one of \('lat-long', .*, got 'cross'"):
         read_environment("a.exr", layout="cross")
     with pytest.raises(ValueError, match=r"orientation must be one of .*'jaxsh'.*, got 'up'"):
         read_environment("a.exr", orientation="up")
+    with pytest.raises(
+        ValueError, match=r"orientation must be .* for layout 'cube', got 'blender'"
+    ):
+        read_environment("a.exr", layout="cube", orientation="blender")
+    for height in (0, 8193):
+        with pytest.raises(ValueError, match=f"height must be between 1 and 8192, got {height}"):
+            read_environment("a.exr", height=height)
+    with pytest.raises(ValueError, match="layout 'lat-long' does not come in 6 files"):
+        read_environment(["a.exr"] * 6)
+    with pytest.raises(ValueError, match="layout 'cube' does not come in 5 files"):
+        read_environment(["a.exr"] * 5, layout="cube")
     with pytest.raises(ValueError, match=r"a\.png: cannot read \.png, only"):
         read_environment(tmp_path / "a.png")
     with pytest.raises(FileNotFoundError, match=r"a\.exr: there is no such picture"):
         read_environment(tmp_path / "a.exr")
 
 
+def pfm(pixels, kind=b"PF", scale=b"-1.0", order="<f4") -> bytes:
+    height, width = pixels.shape[:2]
+    return b"%s\n%d %d\n%s\n" % (kind, width, height, scale) + pixels[::-1].astype(order).tobytes()
+
+
+@pytest.mark.parametrize(("scale", "order"), [(b"-1.0", "<f4"), (b"1", ">f4"), (b"+2e0\r", ">f4")])
+def test_pfm_is_read_exactly(tmp_path, picture, scale, order):
+    path = tmp_path / "a.pfm"
+    path.write_bytes(pfm(picture, scale=scale, order=order))
+    np.testing.assert_array_equal(read_environment(path), picture)
+    path.write_bytes(pfm(picture[..., :1], b"Pf", scale, order))
+    np.testing.assert_array_equal(read_environment(path), np.repeat(picture[..., :1], 3, axis=-1))
+
+
+@pytest.mark.parametrize("dtype", ["<f2", "<f4", ">f4", "<f8"])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_npy_is_read_exactly(tmp_path, picture, dtype, order):
+    pixels = np.asarray(picture.astype(dtype), order=order)
+    np.save(tmp_path / "a.npy", pixels)
+    image = read_environment(tmp_path / "a.npy")
+    assert image.dtype == np.float32
+    np.testing.assert_array_equal(image, pixels.astype(np.float32))
+    np.save(tmp_path / "a.npy", pixels[..., 1])
+    np.testing.assert_array_equal(
+        read_environment(tmp_path / "a.npy"), np.repeat(image[..., 1:2], 3, axis=-1)
+    )
+
+
+def test_a_number_beyond_float32_is_infinite(tmp_path, picture):
+    pixels = picture.astype(np.float64)
+    pixels[0, 0, 0] = 1e39
+    np.save(tmp_path / "a.npy", pixels)
+    with pytest.raises(ValueError, match="1 infinite values"):
+        read_environment(tmp_path / "a.npy")
+
+
+@pytest.mark.parametrize(
+    ("array", "message"),
+    [
+        (np.ones((4, 8, 3), int), "needs float16, float32 or float64, got int64"),
+        (np.ones((4, 8, 4)), r"needs shape \(h, w, 3\) or \(h, w\), got \(4, 8, 4\)"),
+        (np.ones(8), "needs shape .* got \\(8,\\)"),
+        (np.ones((0, 0, 3)), "a picture needs pixels"),
+        (np.array([[None]]), "needs float16, float32 or float64, got object"),
+    ],
+)
+def test_other_arrays_are_refused(tmp_path, array, message):
+    np.save(tmp_path / "a.npy", array)
+    with pytest.raises(ValueError, match=rf"a\.npy: {message}"):
+        read_environment(tmp_path / "a.npy")
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        (b"P6\n16 8\n-1.0\n", "not a .pfm file"),
+        (b"PF\n16 -8\n-1.0\n", "not a .pfm file"),
+        (b"PF\n16 8\n0.0\n", "its scale is 0.0"),
+        (b"PF\n16 8\n1e999\n", "its scale is 1e999"),
+        (b"PF\n16 8\n1-1\n", "its scale is 1-1"),
+        (b"PF\n16 0\n-1.0\n", "a picture needs pixels"),
+        (b"PF\n14 7\n-1.0\n", "takes 1176 bytes, but 1536 are there"),
+        (b"PF\n999999999 499999999\n-1.0\n", "but 1536 are there"),
+    ],
+)
+def test_a_wrong_pfm_header_is_refused(tmp_path, picture, header, message):
+    path = tmp_path / "a.pfm"
+    path.write_bytes(header + pfm(picture)[len(b"PF\n16 8\n-1.0\n") :])
+    with pytest.raises(ValueError, match=rf"a\.pfm: .*{message}"):
+        read_environment(path)
+
+
+def test_an_hdr_with_fewer_rows_than_pixels_is_refused(tmp_path, picture):
+    """Decoders are content with what the header announces."""
+    path = write_image(tmp_path / "a.hdr", np.concatenate([picture, picture]))
+    assert read_environment(path, layout="angular-map").shape == (8, 16, 3)
+    path.write_bytes(path.read_bytes().replace(b"-Y 16 +X 16", b"-Y 8 +X 16"))
+    with pytest.raises(ValueError, match=r"a\.hdr: damaged: 16 × 8 pixels end at byte \d+ of"):
+        read_environment(path)
+
+
+def test_a_narrow_hdr_is_not_run_length_coded(tmp_path, rng):
+    pixels = rng.uniform(0.5, 1, size=(2, 4, 3)).astype(np.float32)
+    path = write_image(tmp_path / "a.hdr", pixels)
+    np.testing.assert_allclose(read_environment(path), pixels, atol=1 / 128)
+    path.write_bytes(path.read_bytes() + b"\0")
+    with pytest.raises(ValueError, match="pixels end at byte"):
+        read_environment(path)
+
+
+@pytest.mark.parametrize("shape", [(24, 32), (32, 24), (16, 16), (24, 4), (8, 16)])
+def test_the_layout_that_a_shape_could_be_is_named(tmp_path, shape):
+    like = {
+        (24, 32): "horizontal-cross",
+        (32, 24): "vertical-cross",
+        (16, 16): "angular-map",
+        (24, 4): "cube",
+        (8, 16): "lat-long",
+    }[shape]
+    path = save(tmp_path / "a.exr", np.ones((*shape, 3)))
+    for layout in ("lat-long", "angular-map", "horizontal-cross", "vertical-cross", "cube"):
+        if layout != like:
+            with pytest.raises(ValueError, match=rf"a\.exr: .*{layout} .* layout '{like}'"):
+                read_environment(path, layout=layout)
+
+
+@pytest.mark.parametrize("shape", [(9, 16), (25, 32), (31, 31)])
+def test_no_layout_is_named_for_an_odd_shape(tmp_path, shape):
+    path = save(tmp_path / "a.exr", np.ones((*shape, 3)))
+    layout = "horizontal-cross" if shape[0] == shape[1] else "lat-long"
+    with pytest.raises(ValueError, match=f"not {shape[1]} × {shape[0]}"):
+        read_environment(path, layout=layout)
+
+
+def test_six_files_are_one_cube(tmp_path, rng):
+    faces = rng.uniform(1, 2, size=(6, 8, 8, 3)).astype(np.float32)
+    together = save(tmp_path / "cube.exr", faces.reshape(48, 8, 3))
+    paths = [save(tmp_path / f"{i}.exr", face) for i, face in enumerate(faces)]
+    image = read_environment(paths, layout="cube")
+    assert image.shape == (16, 32, 3)
+    np.testing.assert_array_equal(image, read_environment(together, layout="cube"))
+    save(paths[2], faces[2, :4, :4])
+    with pytest.raises(ValueError, match=r"six faces must have one size.*2\.exr: 4 × 4"):
+        read_environment(paths, layout="cube")
+
+
+def test_only_pixels_in_use_are_faults(tmp_path):
+    """A corner of the angular map or the cross may hold anything; a face may not."""
+    pixels = np.ones((24, 24, 3))
+    pixels[0, 0], pixels[-1, -1] = np.nan, -1
+    path = save(tmp_path / "a.exr", pixels)
+    np.testing.assert_allclose(read_environment(path, layout="angular-map"), 1, rtol=1e-6)
+    pixels[12, 12] = np.nan
+    with pytest.raises(ValueError, match=r"a\.exr: 3 NaN values"):
+        read_environment(save(path, pixels), layout="angular-map")
+    with pytest.warns(UserWarning, match=r"a\.exr: replaced 3 NaN values"):
+        image = read_environment(path, layout="angular-map", repair=True)
+    assert 0.8 < image.mean() < 1
+    cross = np.full((24, 32, 3), np.inf)
+    cross[8:16], cross[:, 8:16] = 1, 1
+    image = read_environment(save(path, cross), layout="horizontal-cross")
+    np.testing.assert_allclose(image, 1, rtol=1e-6)
+    cross[8:16], cross[:, 8:16] = 0, 0
+    cross[0, 0] = 1
+    with pytest.raises(ValueError, match="all black"):
+        read_environment(save(path, cross), layout="horizontal-cross")
+
+
 def encoded(folder, suffix: str) -> bytes:
-    pixels = np.random.default_rng(5).uniform(0, 4, size=(8, 16, 3))
-    return write_image(folder / f"whole{suffix}", pixels).read_bytes()
+    pixels = np.random.default_rng(5).uniform(0, 4, size=(8, 16, 3)).astype(np.float32)
+    path = folder / f"whole{suffix}"
+    if suffix == ".pfm":
+        return pfm(pixels)
+    if suffix == ".npy":
+        np.save(path, pixels)
+        return path.read_bytes()
+    return write_image(path, pixels).read_bytes()
 
 
-@pytest.mark.parametrize("suffix", [".exr", ".hdr"])
+FORMATS = (".exr", ".hdr", ".pfm", ".npy")
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
 def test_no_truncated_file_is_taken_for_a_whole(tmp_path, suffix):
     data, path = encoded(tmp_path, suffix), tmp_path / f"cut{suffix}"
     for length in range(0, len(data), max(1, len(data) // 100)):
@@ -178,24 +346,54 @@ def read_or_refuse(path, data):
     assert image.any()
 
 
-@pytest.mark.parametrize("suffix", [".exr", ".hdr"])
+@pytest.mark.parametrize("suffix", FORMATS)
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.binary(max_size=400))
 def test_random_bytes_never_crash(tmp_path, suffix, data):
     read_or_refuse(tmp_path / f"random{suffix}", data)
 
 
-@pytest.mark.parametrize("suffix", [".exr", ".hdr"])
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
-@given(
-    edits=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.binary(max_size=8)), max_size=4)
+EDITS = st.lists(
+    st.tuples(st.floats(0, 1, exclude_max=True), st.binary(max_size=8), st.integers(0, 8)),
+    max_size=4,
 )
-def test_changed_bytes_never_crash(tmp_path, suffix, edits):
-    data = bytearray(encoded(tmp_path, suffix))
-    for where, new in edits:
-        at = int(where * len(data))
-        data[at : at + len(new)] = new
-    read_or_refuse(tmp_path / f"changed{suffix}", bytes(data))
+# A header's numbers, and other digits in their place: files that are whole but for their sizes.
+DIGITS = st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.sampled_from(b"0123456789")))
+
+
+def changed(data: bytes, edits, digits) -> bytes:
+    out = bytearray(data)
+    numbers = [i for i, byte in enumerate(data[:128]) if chr(byte).isdigit()]
+    for where, digit in digits if numbers else ():
+        out[numbers[int(where * len(numbers))]] = digit
+    for where, new, removed in edits:
+        at = int(where * len(out))
+        out[at : at + removed] = new
+    return bytes(out)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
+@given(edits=EDITS, digits=DIGITS)
+def test_changed_bytes_never_crash(tmp_path, suffix, edits, digits):
+    data = changed(encoded(tmp_path, suffix), edits, digits)
+    read_or_refuse(tmp_path / f"changed{suffix}", data)
+
+
+@pytest.mark.parametrize("suffix", [".hdr", ".pfm", ".npy"])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
+@given(digits=DIGITS)
+def test_no_other_size_is_believed(tmp_path, suffix, digits):
+    """Another size in the header is no other picture: it is refused, or it is the same size."""
+    path = tmp_path / f"sized{suffix}"
+    path.write_bytes(changed(encoded(tmp_path, suffix), [], digits))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", category=UserWarning, message=".*replaced")
+        try:
+            image = read_environment(path, repair=True)
+        except ValueError:
+            return
+    assert image.shape == (8, 16, 3)
 
 
 def test_a_huge_announcement_does_not_allocate(tmp_path):
@@ -203,6 +401,24 @@ def test_a_huge_announcement_does_not_allocate(tmp_path):
     data = encoded(tmp_path, ".hdr").replace(b"-Y 8 +X 16", b"-Y 40000 +X 80000")
     path.write_bytes(data)
     with pytest.raises(ValueError, match=r"huge\.hdr: damaged"):
+        read_environment(path)
+
+
+def test_a_huge_tile_does_not_allocate(tmp_path, picture):
+    spec = oiio.ImageSpec(16, 8, 3, "float")
+    spec.tile_width = spec.tile_height = 16
+    out = oiio.ImageOutput.create("a.exr")
+    path = tmp_path / "a.exr"
+    assert out.open(str(path), spec)
+    assert out.write_image(picture)
+    out.close()
+    np.testing.assert_array_equal(read_environment(path), picture)
+    # The attribute's name, type, length and width.
+    at = path.read_bytes().index(b"tiledesc\0") + len(b"tiledesc\0") + 4
+    data = bytearray(path.read_bytes())
+    data[at : at + 8] = (8976).to_bytes(4, "little") + (4096).to_bytes(4, "little")
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match=r"a\.exr: damaged: 16 × 8 pixels cannot be in a file"):
         read_environment(path)
 
 

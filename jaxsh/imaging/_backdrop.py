@@ -1,0 +1,73 @@
+"""A lat-long environment seen along directions, and behind what a camera sees."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ._camera import Camera
+
+
+def look_up(
+    environment: Float[Array, "height width c"], directions: Float[Array, "*shape 3"]
+) -> Float[Array, "*shape c"]:
+    """Radiance of a lat-long picture along directions: bilinear, wrapped in φ, whole at the poles.
+
+    Directions need no unit length, if their squares stay in range; zero is taken for +z. Between
+    the outermost pixel centres and a pole the look-up runs to the mean of the outermost row, so
+    that the pole has one value from all sides. Has the dtype of `environment`. Linear and
+    differentiable in it; in the directions too, with kinks between pixels, where a slope is that
+    of one side, and zero slope at the poles.
+    """
+    if environment.ndim != 3 or directions.ndim == 0 or directions.shape[-1] != 3:
+        raise ValueError(
+            f"expected an environment (height, width, channels) and directions (..., 3), got "
+            f"shapes {environment.shape} and {directions.shape}"
+        )
+    return _look_up(environment, directions)
+
+
+def backdrop(environment: Float[Array, "height width c"], camera: Camera) -> Float[Array, "h w c"]:
+    """The environment as the camera sees it through its pixel centres, for `interpolate`.
+
+    Differentiable as `look_up`, in the environment and in the camera.
+    """
+    return _backdrop(environment, camera)
+
+
+@eqx.filter_jit
+def _backdrop(environment, camera: Camera):
+    _, directions = camera.rays()
+    return look_up(environment, directions.reshape(camera.height, camera.width, 3))
+
+
+@jax.jit
+def _look_up(environment, directions):
+    height, width, _ = environment.shape
+    dtype = directions.dtype
+    x, y, z = (directions[..., axis] for axis in range(3))
+    squared = x * x + y * y
+    aside = squared > 0  # on the poles the angles have no derivative
+    safe = jnp.where(aside, squared, 1)
+    theta = jnp.arctan2(jnp.where(aside, jnp.sqrt(safe), 0), jnp.where(aside, z, 1))
+    theta = jnp.where(aside, theta, jnp.where(z < 0, jnp.asarray(jnp.pi, dtype), 0))
+    phi = jnp.arctan2(jnp.where(aside, y, 0), jnp.where(aside, x, 1))
+    row = jnp.clip(theta / jnp.pi, 0, 1) * height - 0.5
+    column = (phi / (2 * jnp.pi)) % 1 * width - 0.5
+
+    # Beyond the edge so much that half-way, on the pole, all columns meet in their mean.
+    top, bottom = (
+        2 * jnp.mean(edge, axis=1, keepdims=True) - edge
+        for edge in (environment[:1], environment[-1:])
+    )
+    padded = jnp.concatenate([top, environment, bottom])
+    i, j = jnp.floor(row), jnp.floor(column)
+    down = (row - i).astype(environment.dtype)[..., None]
+    right = (column - j).astype(environment.dtype)[..., None]
+    i = jnp.clip(i.astype(jnp.int32), -1, height - 1)
+    left = j.astype(jnp.int32) % width
+    upper, lower = (
+        padded[k, left] * (1 - right) + padded[k, (left + 1) % width] * right
+        for k in (i + 1, i + 2)
+    )
+    return upper * (1 - down) + lower * down

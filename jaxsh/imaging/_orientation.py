@@ -1,0 +1,68 @@
+"""Where a picture's own axes stand in ours."""
+
+import numpy as np
+from jaxtyping import Float
+
+# For each layout and orientation, where the picture's right, up and centre ("forward") land.
+# For the cube, where the x, y and z of its face table land.
+#
+# Right-handed y-up axes are turned like the vertices of `read_mesh(path, up="y")`, (x, y, z) ->
+# (x, -z, y), so that a scene's light and meshes stay together. Sources:
+# - mitsuba: Mitsuba 3, `direction_to_uv` in src/emitters/envmap.cpp: y up, centre +z, right -x
+# - nvdiffrec: `latlong_to_cubemap` in render/util.py: y up, centre -z, right +x; also the lat-long
+#   files of the USC high-resolution light probe page
+# - blender: `direction_to_equirectangular` in Cycles' kernel: z up as here, centre +x, right -y
+# - -z, +z: the text and the formula of Debevec's light probe gallery, which do not agree
+# - opengl, direct3d: the same face table in right-handed and in left-handed y-up axes
+_DEBEVEC = {"jaxsh": "+y +z -x", "-z": "+x +z +y", "+z": "+x +z -y"}
+_LANDS = {
+    "lat-long": {
+        "jaxsh": "-y +z -x",
+        "debevec": "+y +z -x",
+        "mitsuba": "-x +z -y",
+        "blender": "-y +z +x",
+        "nvdiffrec": "+x +z +y",
+    },
+    "angular-map": _DEBEVEC,
+    "horizontal-cross": _DEBEVEC,
+    "vertical-cross": _DEBEVEC,
+    "cube": {"jaxsh": "+x +y +z", "direct3d": "+y +z -x", "opengl": "+x +z -y"},
+}
+
+LAYOUTS = tuple(_LANDS)
+
+
+def axes_of(layout: str, orientation: str) -> Float[np.ndarray, "3 3"]:
+    """Rows: where the picture's first, second and third axis land in ours."""
+    if layout not in _LANDS:
+        raise ValueError(f"layout must be one of {LAYOUTS}, got {layout!r}")
+    if orientation not in _LANDS[layout]:
+        known = tuple(_LANDS[layout])
+        raise ValueError(
+            f"orientation must be one of {known} for layout {layout!r}, got {orientation!r}"
+        )
+    axes = np.zeros((3, 3))
+    for row, (sign, name) in enumerate(_LANDS[layout][orientation].split()):
+        axes[row, "xyz".index(name)] = int(sign + "1")
+    return axes
+
+
+def turn_columns(
+    image: Float[np.ndarray, "h w 3"], axes: Float[np.ndarray, "3 3"]
+) -> Float[np.ndarray, "h w 3"]:
+    """A lat-long picture with its columns in our order: flipped, rolled, never resampled.
+
+    A roll by half a column, which a quarter turn of an odd number of rows asks for, gives each
+    pixel the mean of the two that it overlaps: the integral stays, detail is lost.
+    """
+    width = image.shape[1]
+    right, forward = (np.arctan2(axis[1], axis[0]) for axis in (axes[0], axes[2]))
+    # The centre, at half the width, goes to φ = forward.
+    if np.sin(right - forward) < 0:  # φ falls to the right
+        image = image[:, ::-1]
+    columns = width * (forward - np.pi) / (2 * np.pi)
+    whole = int(np.floor(columns + 1e-6))
+    rolled = np.roll(image, whole, axis=1)
+    if columns - whole < 0.25:
+        return rolled
+    return rolled / 2 + np.roll(rolled, 1, axis=1) / 2
