@@ -14,11 +14,12 @@ import functools
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Float, Int
 
 from ._checks import as_float
 from ._indexing import check_degree, degrees
 from ._tables import azimuth_table, gradient_table, zenith_table
+from ._unit import components_first, normalize
 
 
 def evaluate(
@@ -71,63 +72,19 @@ def _checked(vectors, degree, axis):
 
 @functools.partial(jax.jit, static_argnums=(1, 2))
 def _evaluate(vectors, degree, axis):
-    unit, _ = _normalize(_components_first(vectors))
+    unit, _ = normalize(components_first(vectors))
     basis = _solid(unit, degree).reshape((degree + 1) ** 2, *vectors.shape[:-1])
     return basis if axis == 0 else jnp.moveaxis(basis, 0, -1)
 
 
 @functools.partial(jax.jit, static_argnums=(1, 2))
 def _evaluate_with_gradient(vectors, degree, axis):
-    unit, inverse_length = _normalize(_components_first(vectors))
-    basis = _solid(unit, degree)
-    # ∇y = (∇(r^l y) - l n y) / |s|, by Euler's theorem. The normal comes from y_1 = c·(y, z, x):
-    # rows that are there already, where `unit` would be fused in and normalised 3K times over.
-    x, y, z = (basis[i : i + 1] for i in ((3, 1, 2) if degree else (0, 0, 0)))
-    scale = np.sqrt(4 * np.pi / 3) * degrees(degree)
-    radial = jnp.stack([x, y, z]) * (scale.astype(basis.dtype)[:, None] * basis)[None]
-    gradient = (_derivative(basis, degree) - radial) * inverse_length[None]
+    basis, gradient = _with_gradient(*normalize(components_first(vectors)), degree)
     shape = ((degree + 1) ** 2, *vectors.shape[:-1])
     basis, gradient = basis.reshape(shape), gradient.reshape(3, *shape)
     if axis == 0:
         return basis, gradient
     return jnp.moveaxis(basis, 0, -1), jnp.moveaxis(gradient, (0, 1), (-1, -2))
-
-
-def _components_first(vectors: Float[Array, "*batch 3"]) -> Float[Array, "3 1 n"]:
-    return vectors.reshape(-1, 3).T[:, None]
-
-
-@jax.custom_jvp
-def _normalize(s: Float[Array, "3 1 n"]) -> tuple[Float[Array, "3 1 n"], Float[Array, "1 n"]]:
-    """Unit vectors and the reciprocals of the vectors' lengths, components first.
-
-    Sums are written out and √(1/a) is not 1/√a: on the CPU, XLA's reductions over three rows and
-    its reciprocal square root in float64 each cost more than all the rest.
-    """
-    # A length whose square would over- or underflow is none the less a length, so the largest
-    # component is taken out; after a power of two, since the reciprocal of a very large one would
-    # itself be flushed to zero.
-    x, y, z = jnp.abs(s)
-    largest = jnp.maximum(jnp.maximum(x, y), z)
-    power = 2.0 ** (jnp.finfo(s.dtype).maxexp // 2)
-    power = jnp.where(largest > 1, jnp.asarray(1 / power, s.dtype), jnp.asarray(power, s.dtype))
-    scaled = (s * power[None]) / (largest * power)[None]
-    inverse = jnp.sqrt(1 / _dot(scaled, scaled))
-    return scaled * inverse[None], inverse / largest
-
-
-@_normalize.defjvp
-def _normalize_jvp(primals, tangents):
-    unit, inverse_length = _normalize(*primals)
-    (tangent,) = tangents
-    along = _dot(unit, tangent)
-    # Component by component, so that the transpose has no sums over three rows either.
-    turned = [(t - u * along) * inverse_length for t, u in zip(tangent, unit, strict=True)]
-    return (unit, inverse_length), (jnp.stack(turned), -(along * inverse_length) * inverse_length)
-
-
-def _dot(a: Float[Array, "3 1 n"], b: Float[Array, "3 1 n"]) -> Float[Array, "1 n"]:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1,))
@@ -149,34 +106,90 @@ def _solid_jvp(degree, primals, tangents):
     return basis, _derivative_along(basis, tangent, degree)
 
 
-def _derivative(basis: Float[Array, "k n"], degree: int) -> Float[Array, "3 k n"]:
-    """∇(r^l y_lm) on the unit sphere."""
+@functools.partial(jax.custom_jvp, nondiff_argnums=(2,))
+def _with_gradient(
+    unit: Float[Array, "3 1 n"], inverse_length: Float[Array, "1 n"], degree: int
+) -> tuple[Float[Array, "k n"], Float[Array, "3 k n"]]:
+    """The basis, and ∇y = (∇(r^l y) - l n y) / |s|, by Euler's theorem."""
+    basis = _solid(unit, degree)
+    # The normal comes from y_1 = c·(y, z, x): rows that are there already, where `unit` would be
+    # fused in and normalised 3K times over.
+    normal = jnp.stack([basis[i : i + 1] for i in ((3, 1, 2) if degree else (0, 0, 0))])
+    scale = np.sqrt(4 * np.pi / 3) * degrees(degree)
+    radial = normal * (scale.astype(basis.dtype)[:, None] * basis)[None]
     table = gradient_table(degree)
     first, second = (jnp.asarray(t, basis.dtype)[..., None] for t in (table.first, table.second))
-    derivative = first * _take(basis, table.first_row)
-    return derivative + second * _take(basis, table.second_row)
+    solid = first * _take(basis, table.first_row) + second * _take(basis, table.second_row)
+    return basis, (solid - radial) * inverse_length[None]
+
+
+@_with_gradient.defjvp
+def _with_gradient_jvp(degree, primals, tangents):
+    basis, gradient = _with_gradient(*primals, degree)
+    normal, inverse_length = _rows(primals[0]), primals[1][0]
+    turn, stretch = _rows(tangents[0]), tangents[1][0]
+
+    def row(k, basis, normal, inverse_length, turn, stretch, terms, l):
+        """Row k of the basis's tangent and, for x, y and z, of its gradient's."""
+        value, change = _take(basis, k), _along(basis, turn, terms, k)
+        changes = []
+        for axis in range(3):
+            (i, a), (j, b) = ((row[k, axis], factor[k, axis]) for row, factor in terms)
+            solid = a * _take(basis, i) + b * _take(basis, j)
+            bend = a * _along(basis, turn, terms, i) + b * _along(basis, turn, terms, j)
+            radial = l[k] * normal[axis] * value
+            radial_change = l[k] * (turn[axis] * value + normal[axis] * change)
+            changes.append((bend - radial_change) * inverse_length + (solid - radial) * stretch)
+        return change, changes
+
+    l = jnp.asarray(degrees(degree), basis.dtype)
+    arguments = basis, normal, inverse_length, turn, stretch, _terms(degree, basis.dtype), l
+    change, changes = _row_by_row(row, *arguments)
+    return (basis, gradient), (change, jnp.stack(changes))
 
 
 def _derivative_along(
     basis: Float[Array, "k n"], direction: Float[Array, "3 1 n"], degree: int
 ) -> Float[Array, "k n"]:
-    """direction · ∇(r^l y_lm), a row of the basis at a time.
+    """direction · ∇(r^l y_lm) on the unit sphere."""
 
-    For its transpose's sake: reverse mode adds up K rows, and a loop that makes each row anew from
-    the basis does so within the cache, where XLA's reduction over all of them at once is 2 to 40
-    times slower on the CPU.
+    def row(k, basis, direction, terms):
+        return _along(basis, direction, terms, k)
+
+    return _row_by_row(row, basis, _rows(direction), _terms(degree, basis.dtype))
+
+
+def _row_by_row(row, basis: Float[Array, "k n"], *arguments):
+    """All rows k of `row(k, basis, *arguments)`, which is linear in some of its arguments.
+
+    A loop, for its transpose's sake: reverse mode adds up K rows, and a loop that makes each row
+    anew from the basis does so within the cache, where XLA's reduction over all of them at once
+    is 2 to 40 times slower on the CPU. Vectors come as three rows: of one array with three, the
+    transposed loop would copy all of it for each row that it adds to.
     """
+    row = jax.checkpoint(row, prevent_cse=False)
+    return jax.lax.map(lambda k: row(k, basis, *arguments), jnp.arange(len(basis), dtype=jnp.int32))
 
-    @functools.partial(jax.checkpoint, prevent_cse=False)
-    def along(basis, x, y, z, terms):
-        first_row, first, second_row, second = terms
-        axes = zip((x, y, z), first_row, first, second_row, second, strict=True)
-        return sum((a * _take(basis, i) + b * _take(basis, j)) * t for t, i, a, j, b in axes)
 
+def _rows(vectors: Float[Array, "3 1 n"]) -> tuple[Float[Array, " n"], ...]:
+    return tuple(vectors[:, 0])
+
+
+def _terms(degree: int, dtype) -> list[tuple[Int[Array, "k 3"], Float[Array, "k 3"]]]:
+    """The two terms of each derivative: rows of the basis, and factors."""
     table = gradient_table(degree)
-    first, second = (jnp.asarray(t.T, basis.dtype) for t in (table.first, table.second))
-    terms = jnp.asarray(table.first_row.T), first, jnp.asarray(table.second_row.T), second
-    return jax.lax.map(functools.partial(along, basis, *direction[:, 0]), terms)
+    pairs = (table.first_row, table.first), (table.second_row, table.second)
+    return [(jnp.asarray(row.T), jnp.asarray(factor.T, dtype)) for row, factor in pairs]
+
+
+def _along(basis: Float[Array, "k n"], direction, terms, k) -> Float[Array, " n"]:
+    """direction · ∇ of row k."""
+    slopes = (
+        factor[k, axis] * _take(basis, row[k, axis]) * direction[axis]
+        for row, factor in terms
+        for axis in range(3)
+    )
+    return functools.reduce(jnp.add, slopes)
 
 
 def _azimuth(
