@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 _PACKAGES = (
-    *("jaxsh", "jax", "jaxlib", "numpy", "equinox", "optimistix", "lineax", "jaxopt"),
+    *("jaxsh", "jax", "jaxlib", "numpy", "scipy", "equinox", "optimistix", "lineax", "jaxopt"),
     *("trimesh", "embreex", "matplotlib", "OpenImageIO"),
 )
 

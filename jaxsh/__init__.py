@@ -16,8 +16,9 @@ if _TYPE_CHECKING:
     from . import harmonics as harmonics
     from . import imaging as imaging
     from . import sphere as sphere
+    from . import transfer as transfer
 
-__all__ = ["geometry", "harmonics", "imaging", "sphere"]
+__all__ = ["geometry", "harmonics", "imaging", "sphere", "transfer"]
 __version__ = "0.1.0"
 
 

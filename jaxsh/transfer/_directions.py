@@ -1,0 +1,76 @@
+"""The directions that all vertices share, and which of them are worth a ray at first."""
+
+import math
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from ..harmonics import evaluate
+from ..sphere import fibonacci
+
+# For each ray that the user grants the sphere: directions in the quadrature, and guides. So a
+# vertex of the armadillo casts 8 % fewer rays than with an even set of the granted size, and errs
+# about half as much: 0.90 % against 1.64 % at 2,048 and degree 10.
+_QUADRATURE, _GUIDES, _FEWEST_GUIDES = 9 / 4, 1 / 2, 256
+_AROUND = 8
+
+
+class Directions(NamedTuple):
+    """D directions of equal weight, G of them guides.
+
+    Where a guide and those around it agree on whether light is blocked, so do, nearly always,
+    the directions nearest to it; only elsewhere need they be asked.
+    """
+
+    vectors: Float[np.ndarray, "d 3"]
+    basis: Float[Array, "d k"]  # y_i times the directions' weight
+    guides: Int[np.ndarray, " g"]  # which directions they are
+    nearest: Int[np.ndarray, " d"]  # each direction's guide, as one of G; a guide's is itself
+    around: Int[np.ndarray, "n g"]  # the guides next to each guide
+
+
+def guided(rays: int, degree: int, seed: int, dtype: np.dtype) -> Directions:
+    """A quadrature finer than `rays` on the sphere, to be cast where guides disagree."""
+    count = math.ceil(_QUADRATURE * rays)
+    vectors = turned_fibonacci(count, seed, dtype)
+    guides = _spread(vectors, min(count, max(round(_GUIDES * rays), _FEWEST_GUIDES)))
+    chosen = vectors[guides]
+    order = np.concatenate(
+        [np.argsort(-(part @ chosen.T), axis=1)[:, 1 : _AROUND + 1] for part in _parts(chosen)]
+    )
+    return Directions(
+        vectors=vectors,
+        basis=evaluate(jnp.asarray(vectors), degree) * (4 * math.pi / count),
+        guides=guides,
+        nearest=np.concatenate([(part @ chosen.T).argmax(axis=1) for part in _parts(vectors)]),
+        around=np.ascontiguousarray(order.T),
+    )
+
+
+def turned_fibonacci(count: int, seed: int, dtype: np.dtype) -> Float[np.ndarray, "count 3"]:
+    """Directions of weight 4π/count, by a rotation drawn uniformly."""
+    quaternion = np.random.default_rng(seed).normal(size=4)
+    w, *v = quaternion / np.linalg.norm(quaternion)
+    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    rotation = np.eye(3) + 2 * w * cross + 2 * cross @ cross
+    directions = np.asarray(fibonacci(count).directions, np.float64)
+    return (directions @ rotation.T).astype(dtype)
+
+
+def _spread(vectors: Float[np.ndarray, "d 3"], count: int) -> Int[np.ndarray, " count"]:
+    """Indices of `count` vectors, each the one farthest from those before it, ascending."""
+    chosen = np.empty(count, int)
+    distance = np.full(len(vectors), np.inf)
+    farthest = 0
+    for i in range(count):
+        chosen[i] = farthest
+        distance = np.minimum(distance, 1 - vectors @ vectors[farthest])
+        distance[farthest] = -1  # rounding must not let it be chosen again
+        farthest = int(distance.argmax())
+    return np.sort(chosen)
+
+
+def _parts(vectors: np.ndarray) -> list[np.ndarray]:
+    return [vectors[start : start + 1024] for start in range(0, len(vectors), 1024)]

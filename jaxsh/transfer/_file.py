@@ -1,0 +1,85 @@
+"""Transfer in a file: NumPy's .npz with a name and a version, and nothing that could run."""
+
+import os
+import zipfile
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..harmonics import degree_of
+from ._transfer import Transfer
+
+_FORMAT, _VERSION = "jaxsh transfer", 1
+_FIELDS = {"coefficients": "f", "positions": "f", "normals": "f", "neighbors": "i"}
+
+
+def save(path: str | os.PathLike[str], transfer: Transfer) -> Path:
+    """Write a transfer to a file, which holds every array to the last bit, and return its path.
+
+    A file that is there is replaced, once the new one is whole. Makes missing folders. NumPy
+    reads the file too: `numpy.load(path)["coefficients"]`. Raises `ValueError` for arrays that do
+    not make a transfer, and `OSError` where the file cannot be written.
+    """
+    path = Path(path)
+    arrays = {name: np.asarray(getattr(transfer, name)) for name in _FIELDS}
+    if problem := _problem(arrays):
+        raise ValueError(f"{path}: cannot be written: {problem}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    try:
+        with unfinished.open("wb") as file:
+            labels = {"format": np.array(_FORMAT), "version": np.array(_VERSION)}
+            np.savez(file, allow_pickle=False, **labels, **arrays)
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return path
+
+
+def load(path: str | os.PathLike[str]) -> Transfer:
+    """The transfer that `save` wrote. Float64 becomes float32 where JAX's x64 is off.
+
+    Raises `FileNotFoundError` for a missing file, and `ValueError`, naming the file and the
+    problem, for one that is truncated or damaged, of another kind, or of a newer version.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: there is no such transfer file")
+    if not zipfile.is_zipfile(path):
+        raise ValueError(f"{path}: not a transfer file, or a truncated one")
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: np.asarray(file[name]) for name in file.files}
+    except Exception as error:  # a damaged archive may raise anything
+        reason = str(error).strip().split("\n")[0] or type(error).__name__
+        raise ValueError(f"{path}: damaged: {reason}") from error
+    if str(arrays.pop("format", None)) != _FORMAT:
+        raise ValueError(f"{path}: not a transfer file")
+    version = arrays.pop("version", np.array(0))
+    if version.shape or version.dtype.kind != "i" or not version == _VERSION:
+        raise ValueError(f"{path}: written as version {version}, but this jaxsh reads {_VERSION}")
+    if problem := _problem(arrays):
+        raise ValueError(f"{path}: damaged: {problem}")
+    return Transfer(**{name: jnp.asarray(arrays[name]) for name in _FIELDS})
+
+
+def _problem(arrays: dict[str, np.ndarray]) -> str | None:
+    """What keeps arrays from being those of a transfer; None where nothing does."""
+    for name, kind in _FIELDS.items():
+        if name not in arrays:
+            return f"it holds no {name}"
+        array = arrays[name]
+        if array.dtype.kind != kind or array.ndim != 2:
+            return f"{name} have dtype {array.dtype} and shape {array.shape}"
+    count, width = arrays["coefficients"].shape
+    if arrays["positions"].shape != (count, 3) or arrays["normals"].shape != (count, 3):
+        return f"positions or normals are not ({count}, 3), as its coefficients want"
+    neighbors = arrays["neighbors"]
+    if len(neighbors) != count or not ((neighbors >= 0) & (neighbors < count)).all():
+        return f"neighbors do not name vertices 0 to {count - 1} for each of {count}"
+    try:
+        degree_of(width)
+    except ValueError as error:
+        return str(error)
+    return None

@@ -1,0 +1,144 @@
+"""What one block of vertices gathers: the light it does not get, and the light that bounces."""
+
+import math
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ..geometry import Hit
+from ._directions import Directions
+from ._receivers import Receivers, Surface
+
+# Rows of every product: with one fixed shape a vertex's sums are added in one fixed order,
+# whatever the block it comes in.
+TILE = 64
+
+
+@runtime_checkable
+class Scene(Protocol):
+    """What stops rays: `geometry.RayScene`, or anything that answers as it does."""
+
+    def occluded(self, origins, directions) -> Bool[np.ndarray, " n"]: ...
+
+    def closest_hit(self, origins, directions) -> Hit: ...
+
+
+def shadowed(
+    scene: Scene,
+    receivers: Receivers,
+    directions: Directions,
+    unshadowed: Float[np.ndarray, "v k"],
+    rows: slice,
+) -> Float[np.ndarray, "rows k"]:
+    """Coefficients of visibility times cosine: those of the cosine less those of what is blocked.
+
+    The cosine's are exact, so that only the blocked part carries the error of the directions, and
+    none is left where nothing is blocked. Exactly zero where no ray gets out.
+    """
+    cosines = _in_tiles(receivers.normals[rows], directions.vectors.T)
+    above = cosines > 0
+    blocked = _blocked(scene, receivers.origins[rows], directions, above)
+    coefficients = unshadowed[rows] - _in_tiles(cosines * blocked, directions.basis)
+    coefficients[above.any(axis=1) & (above == blocked).all(axis=1)] = 0
+    return coefficients
+
+
+def _blocked(
+    scene: Scene,
+    origins: Float[np.ndarray, "rows 3"],
+    directions: Directions,
+    above: Bool[np.ndarray, "rows d"],
+) -> Bool[np.ndarray, "rows d"]:
+    """Which directions above the surface are blocked, from as few rays as tell."""
+    blocked = np.zeros(above.shape, bool)
+
+    def cast(wanted: Bool[np.ndarray, "rows d"]) -> None:
+        rays = _rays(origins, directions.vectors, wanted)
+        blocked.reshape(-1)[rays.flat] = scene.occluded(rays.origins, rays.directions)
+
+    guides, nearest = directions.guides, directions.nearest
+    first = np.zeros_like(above)
+    first[:, guides] = above[:, guides]
+    cast(first)
+    answer = blocked[:, guides]
+    known = above[:, guides]
+    doubtful = ~known
+    for other in directions.around:
+        doubtful |= (answer != answer[:, other]) & known[:, other]
+    rest = above & ~first
+    doubtful = np.take(doubtful, nearest, axis=1)
+    cast(rest & doubtful)
+    return blocked | (rest & ~doubtful & np.take(answer, nearest, axis=1))
+
+
+def bounced(
+    scene: Scene,
+    receivers: Receivers,
+    vectors: Float[np.ndarray, "d 3"],
+    surface: Surface,
+    outgoing: Float[np.ndarray, "v k"],
+    rows: slice,
+) -> Float[np.ndarray, "rows k"]:
+    """Σ w max(0, n·ω) outgoing(hit) over the rays that meet the front of a face of the mesh.
+
+    `outgoing` is interpolated between the vertices of a face with the hit's barycentrics.
+    """
+    from scipy.sparse import csr_array
+
+    cosines = _in_tiles(receivers.normals[rows], vectors.T)
+    rays = _rays(receivers.origins[rows], vectors, cosines > 0)
+    hit = scene.closest_hit(rays.origins, rays.directions)
+    met = np.flatnonzero(hit.mesh == 0)
+    met = met[np.einsum("ij,ij->i", surface.outward[hit.face[met]], rays.directions[met]) < 0]
+
+    weights = cosines.reshape(-1)[rays.flat[met]] * (4 * math.pi / len(vectors))
+    weights = weights[:, None] * hit.barycentric[met].astype(cosines.dtype)
+    ends = 3 * np.searchsorted(rays.row[met], np.arange(len(cosines) + 1))
+    corners = surface.faces[hit.face[met]]
+    shape = len(cosines), len(outgoing)
+    return csr_array((weights.ravel(), corners.ravel(), ends), shape) @ outgoing
+
+
+class _Rays(NamedTuple):
+    flat: Int[np.ndarray, " n"]  # where in the array of rows and directions
+    row: Int[np.ndarray, " n"]
+    origins: Float[np.ndarray, "n 3"]
+    directions: Float[np.ndarray, "n 3"]
+
+
+def _rays(
+    origins: Float[np.ndarray, "rows 3"],
+    directions: Float[np.ndarray, "d 3"],
+    wanted: Bool[np.ndarray, "rows d"],
+) -> _Rays:
+    """One ray for each pair that is wanted, row by row."""
+    count = np.count_nonzero(wanted, axis=1)
+    flat = np.flatnonzero(wanted)
+    row = np.repeat(np.arange(len(wanted)), count)
+    # `repeat` and `take` copy whole vectors, several times as fast as indexing does.
+    towards = np.take(directions, flat - row * wanted.shape[1], axis=0)
+    return _Rays(flat, row, np.repeat(origins, count, axis=0), towards)
+
+
+def _in_tiles(
+    left: Float[np.ndarray, "rows n"], right: Float[np.ndarray | Array, "n k"]
+) -> Float[np.ndarray, "rows k"]:
+    """Their product, `TILE` rows at a time, the last ones filled up with zeros.
+
+    By XLA, whose threads get on with ours; OpenBLAS's spin, and would take the cores from rays.
+    """
+    result = np.empty((len(left), right.shape[1]), left.dtype)
+    for start in range(0, len(left), TILE):
+        tile = left[start : start + TILE]
+        whole = np.zeros((TILE, left.shape[1]), left.dtype)
+        whole[: len(tile)] = tile
+        result[start : start + TILE] = _product(whole, right)[: len(tile)]
+    return result
+
+
+@jax.jit
+def _product(left: Array, right: Array) -> Array:
+    return jnp.matmul(left, right, precision="highest")

@@ -1,0 +1,84 @@
+"""Bodies, scenes and integrals whose transfer is known, for the tests of transfer."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxsh.geometry import Mesh, make_mesh
+from jaxsh.harmonics import evaluate
+
+
+def sphere(rows: int, columns: int, lowest: float = np.pi) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and outward faces of a unit sphere from its pole at +z down to θ = `lowest`."""
+    theta = np.arange(1, rows + 1)[:, None] * lowest / rows
+    phi = np.arange(columns) * 2 * np.pi / columns
+    ring = np.stack(
+        np.broadcast_arrays(
+            np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)
+        ),
+        axis=-1,
+    )
+    vertices = np.concatenate([[[0, 0, 1]], ring.reshape(-1, 3)])
+    i, j = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
+    a, b = 1 + i * columns + j, 1 + i * columns + (j + 1) % columns
+    j = np.arange(columns)
+    faces = [
+        (a, a + columns, b + columns),
+        (a, b + columns, b),
+        (0 * j, 1 + j, 1 + (j + 1) % columns),
+    ]
+    return vertices, np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in faces])
+
+
+def ball() -> Mesh:
+    """A convex body: make_mesh drops the faces without area at the lower pole."""
+    vertices, faces = sphere(8, 12, 0.999 * np.pi)
+    return make_mesh(vertices, faces)
+
+
+def cube() -> Mesh:
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32)
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return make_mesh(
+        corners, np.array([[q[i] for i in f] for q in quads for f in ([0, 1, 2], [0, 2, 3])])
+    )
+
+
+def by_hand(vertices, faces, normals) -> Mesh:
+    """A mesh taken as it is."""
+    vertices, normals = jnp.asarray(vertices, jnp.float32), jnp.asarray(normals, jnp.float32)
+    return Mesh(vertices, jnp.asarray(faces, jnp.int32), normals)
+
+
+def points(positions, normals) -> Mesh:
+    """Receivers without a surface of their own, for a scene that shadows them."""
+    return by_hand(positions, np.zeros((0, 3)), normals)
+
+
+def rectangle(corner, u, v) -> Mesh:
+    corner, u, v = (np.asarray(x, np.float32) for x in (corner, u, v))
+    return make_mesh(
+        np.stack([corner, corner + u, corner + u + v, corner + v]), np.array([[0, 1, 2], [0, 2, 3]])
+    )
+
+
+def bowl(opening: float, rows: int, columns: int) -> Mesh:
+    """A spherical cap seen from within, open where θ < `opening`, with the sphere's own normals."""
+    vertices, faces = sphere(rows, columns, np.pi - opening)
+    vertices = vertices * [1, 1, -1]
+    return by_hand(vertices, faces, -vertices)
+
+
+def lune(start: float, end: float, degree: int) -> np.ndarray:
+    """∫ max(0, z) y_i over directions (cos a cos b, sin b, sin a cos b), start < a < end in [0, π].
+
+    By Gauss–Legendre in a and b, exact to rounding at 64 nodes each.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    a = (start + end) / 2 + (end - start) / 2 * nodes[:, None]
+    b = np.pi / 2 * nodes
+    directions = np.stack(
+        np.broadcast_arrays(np.cos(a) * np.cos(b), np.sin(b), np.sin(a) * np.cos(b)), -1
+    )
+    measure = np.multiply.outer((end - start) / 2 * weights, np.pi / 2 * weights * np.cos(b))
+    basis = np.asarray(evaluate(directions, degree))
+    return np.einsum("ab,abk->k", measure * directions[..., 2], basis)

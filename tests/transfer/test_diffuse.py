@@ -1,0 +1,132 @@
+"""Diffuse shading against one einsum, in every shape and mode."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.test_util import check_grads
+
+from jaxsh.transfer import Material, Transfer, shade_diffuse
+
+V, K = 6, 9
+
+
+def transfer(rng, dtype=np.float64, degree=2):
+    shapes = {"coefficients": (V, (degree + 1) ** 2), "positions": (V, 3), "normals": (V, 3)}
+    arrays = {name: jnp.asarray(rng.normal(size=shape), dtype) for name, shape in shapes.items()}
+    return Transfer(**arrays, neighbors=jnp.zeros((V, 1), np.int32))
+
+
+@pytest.mark.parametrize(("dtype", "rtol"), [(np.float32, 3e-6), (np.float64, 1e-14)])
+@pytest.mark.parametrize("lights", [(), (1,), (V,), (5, 1), (5, V), (2, 5, 1), (2, 5, V)])
+@pytest.mark.parametrize("albedo", [(), (3,), (V, 1), (V, 3)])
+def test_equals_the_definition(rng, dtype, rtol, lights, albedo):
+    light = rng.normal(size=(*lights, 3, K))
+    albedo = rng.uniform(size=albedo)
+    made = transfer(rng, dtype)
+    each = np.broadcast_to(light, (*lights[:-1], V, 3, K))
+    exact = albedo / np.pi * np.einsum("...vck,vk->...vc", each, np.asarray(made.coefficients))
+    got = shade_diffuse(jnp.asarray(light, dtype), made, jnp.asarray(albedo, dtype))
+    assert got.shape == (*lights[:-1], V, 3)
+    assert got.dtype == dtype
+    np.testing.assert_allclose(got, exact, rtol=rtol, atol=rtol * np.abs(exact).max())
+
+
+def test_has_the_transfer_s_dtype(rng):
+    made = transfer(rng, np.float32)
+    light = rng.normal(size=(3, K))
+    assert shade_diffuse(light, made, 0.5).dtype == np.float32
+
+
+def test_a_white_surface_under_a_uniform_sky_gives_it_back(rng):
+    """Open to radiance 1, irradiance is π and albedo/π of it leaves."""
+    made = transfer(rng, degree=0)
+    open_sky = jnp.full((V, 1), np.pi * np.sqrt(1 / (4 * np.pi)))
+    made = Transfer(open_sky, made.positions, made.normals, made.neighbors)
+    light = jnp.full((3, 1), np.sqrt(4 * np.pi))
+    np.testing.assert_allclose(shade_diffuse(light, made, 0.25), 0.25, rtol=1e-14)
+
+
+def test_a_lower_light_is_as_one_filled_up_with_zeros(rng):
+    made = transfer(rng, degree=4)
+    light = rng.normal(size=(3, K))
+    filled = np.concatenate([light, np.zeros((3, 25 - K))], axis=1)
+    np.testing.assert_allclose(
+        shade_diffuse(light, made, 1.0), shade_diffuse(filled, made, 1.0), rtol=1e-13, atol=1e-13
+    )
+
+
+@pytest.mark.parametrize("lights", [(), (V,), (2, 1)])
+def test_derivatives_in_everything(rng, lights):
+    made = transfer(rng)
+
+    def shade(light, coefficients, albedo):
+        return shade_diffuse(
+            light,
+            Transfer(jnp.asarray(coefficients), made.positions, made.normals, made.neighbors),
+            albedo,
+        )
+
+    arguments = rng.normal(size=(*lights, 3, K)), made.coefficients, rng.uniform(size=(V, 3))
+    arguments = tuple(map(jnp.asarray, arguments))
+    check_grads(shade, arguments, order=2, modes=["fwd", "rev"], rtol=1e-6, atol=1e-6)
+
+
+def test_jit_and_vmap_agree_with_the_batch(rng):
+    made = transfer(rng)
+    lights = jnp.asarray(rng.normal(size=(4, 3, K)))
+    batch = shade_diffuse(lights[:, None], made, 0.5)
+    mapped = jax.jit(jax.vmap(lambda light: shade_diffuse(light, made, 0.5)))(lights)
+    np.testing.assert_allclose(mapped, batch, rtol=1e-13, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("light", "albedo", "message"),
+    [
+        ((K,), (), r"expected light \(3, K\), or \(\.\.\., 6, 3, K\) .* got shape \(9,\)"),
+        ((4, K), (), r"got shape \(4, 9\)"),
+        ((5, 3, K), (), r"\(\.\.\., 1, 3, K\) for a batch of shared ones, got shape \(5, 3, 9\)"),
+        ((3, 8), (), "got 8"),
+        (
+            (3, 16),
+            (),
+            r"light's degree 3 is above the transfer's, 2; cut it to light\[\.\.\., :9\]",
+        ),
+        (
+            (3, K),
+            (V,),
+            r"expected albedo as a number, \(3,\), \(6, 1\) or \(6, 3\), got shape \(6,\)",
+        ),
+    ],
+)
+def test_bad_shapes_are_refused(unchecked, rng, light, albedo, message):
+    with pytest.raises(ValueError, match=message):
+        shade_diffuse(np.ones(light), transfer(rng), np.ones(albedo))
+
+
+def test_materials_are_arrays_and_trees(rng):
+    material = Material(0.5, jnp.ones(3), jnp.full(V, 32.0))
+    assert material.diffuse.shape == ()
+    assert len(jax.tree.leaves(material)) == 3
+    value, slope = jax.jvp(lambda d: Material(d, 0.1, 8.0).diffuse * 2, (0.5,), (1.0,))
+    assert (value, slope) == (1, 2)
+    jax.jit(lambda d: Material(d, 0.1, 8.0).diffuse)(-1.0)  # not looked at while traced
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ((-0.1, 0.5, 8.0), "diffuse must be finite and >= 0"),
+        ((0.1, [0.5, np.nan, 0], 8.0), "specular must be finite and >= 0"),
+        ((0.1, 0.5, -1.0), "exponent must be finite and above -1"),
+        ((0.1, 0.5, np.inf), "exponent must be finite"),
+        ((np.ones(4), 0.5, 8.0), r"expected diffuse as a number, .* got shape \(4,\)"),
+        ((0.1, np.ones((4, 2)), 8.0), r"expected specular .* got shape \(4, 2\)"),
+        ((0.1, np.ones((1, 4, 3)), 8.0), r"expected specular .* got shape \(1, 4, 3\)"),
+        ((0.1, 0.5, np.ones((4, 1))), r"expected exponent as a number or \(V,\)"),
+        ((np.ones((4, 1)), np.ones((5, 3)), 8.0), "one mesh, .* {'diffuse': 4, 'specular': 5}"),
+    ],
+)
+def test_bad_materials_are_refused(values, message):
+    with pytest.raises(ValueError, match=message):
+        Material(*(np.asarray(value) if isinstance(value, list) else value for value in values))
