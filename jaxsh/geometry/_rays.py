@@ -164,9 +164,10 @@ def _prepared(
     start = np.ascontiguousarray(origins[part], np.float32)
     shared = directions.strides[0] == 0  # Embree's binding takes one row for all rays
     towards = directions[:1] if shared else directions[part]
-    squared = np.einsum("ij,ij->i", towards, towards)
+    squared = _squared(towards)
+    least, most = squared.min(), squared.max()
     # Nearly always all is well, and sums show it: the slow path is exact about what is not.
-    if not (squared.min() > 1e-30 and squared.max() < 1e30 and np.isfinite(start.sum())):
+    if not (least > 1e-30 and most < 1e30 and np.isfinite(start.sum())):
         towards = directions[part].astype(np.float64)
         largest = np.abs(towards).max(axis=1, keepdims=True)
         bad = ~(np.isfinite(start).all(axis=1) & np.isfinite(largest[:, 0]) & (largest[:, 0] > 0))
@@ -178,5 +179,14 @@ def _prepared(
                 f"{towards[ray].tolist()}"
             )
         towards = towards / largest
-        squared = np.einsum("ij,ij->i", towards, towards)
-    return start, np.ascontiguousarray(towards / np.sqrt(squared)[:, None], np.float32)
+        squared = _squared(towards)
+    if least < 1 - 1e-6 or most > 1 + 1e-6:  # else they are units already
+        towards = towards / np.sqrt(squared)[:, None]
+    return start, np.ascontiguousarray(towards, np.float32)
+
+
+def _squared(vectors: np.ndarray) -> np.ndarray:
+    """Squared lengths; several times as fast as `einsum` over three columns."""
+    x, y, z = vectors.T
+    with np.errstate(over="ignore", invalid="ignore"):  # the caller looks at what comes out
+        return x * x + y * y + z * z

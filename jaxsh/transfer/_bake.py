@@ -66,7 +66,7 @@ def bake(
     - `checkpoint`: a file that keeps the blocks finished so far. A bake that was stopped goes on
       from it when called again with the same arguments; it is removed when the bake is done. That
       the `scene` is the same is yours to see to.
-    - `progress`: a bar on standard error, where the bake takes more than a second.
+    - `progress`: a bar, where standard error is a terminal and the bake takes more than a second.
 
     **Returns** a `Transfer` of the dtype of the mesh's vertices. On one machine a seed gives the
     same bits whatever the chunk, the number of threads and the interruptions.

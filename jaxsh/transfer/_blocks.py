@@ -64,12 +64,13 @@ class _NoBar(contextlib.nullcontext):
 
 
 def progress_bar(total: int, shown: bool):
-    """A context that counts vertices on standard error, once it has taken more than a second."""
+    """A context that counts vertices on a terminal, once it has taken more than a second."""
     if not shown:
         return _NoBar()
     from tqdm import tqdm
 
-    return tqdm(total=total, desc="bake", unit=" vertices", delay=1, file=sys.stderr)
+    # `disable=None`: not where nobody looks, as in a log.
+    return tqdm(total=total, desc="bake", unit=" vertices", delay=1, file=sys.stderr, disable=None)
 
 
 def _in_order(gather: Gather, parts: list[slice]) -> Generator[tuple[slice, np.ndarray]]:

@@ -68,10 +68,11 @@ def _blocked(
     doubtful = ~known
     for other in directions.around:
         doubtful |= (answer != answer[:, other]) & known[:, other]
+    # To all directions at once: 0 lets light through, 1 stops it, 2 is to be asked.
+    told = np.take(np.where(doubtful, np.uint8(2), answer), nearest, axis=1)
     rest = above & ~first
-    doubtful = np.take(doubtful, nearest, axis=1)
-    cast(rest & doubtful)
-    return blocked | (rest & ~doubtful & np.take(answer, nearest, axis=1))
+    cast(rest & (told == 2))
+    return blocked | (rest & (told == 1))
 
 
 def bounced(

@@ -1,5 +1,8 @@
 """Baked transfer against closed forms, a slow twin, and itself under every change of procedure."""
 
+import io
+import sys
+
 import bodies
 import jax
 import jax.numpy as jnp
@@ -211,16 +214,18 @@ def test_bad_meshes_are_refused(unchecked):
         bake(Mesh(mesh.vertices[:0], mesh.faces[:0], mesh.normals[:0]), 2)
 
 
-def test_the_bar_can_be_switched_off(capsys, monkeypatch):
+@pytest.mark.parametrize(("terminal", "progress"), [(True, True), (True, False), (False, True)])
+def test_the_bar_is_for_a_terminal_and_can_be_switched_off(terminal, progress, monkeypatch):
     import tqdm
 
     class Eager(tqdm.tqdm):
         def __init__(self, **options):
             super().__init__(**options | {"delay": 0})
 
+    screen = io.StringIO()
+    screen.isatty = lambda: terminal
+    monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setattr(tqdm, "tqdm", Eager)
-    mesh = bodies.cube()
-    bake(mesh, 2, directions=64)
-    assert "8/8" in capsys.readouterr().err
-    bake(mesh, 2, directions=64, progress=False)
-    assert capsys.readouterr().err == ""
+    bake(bodies.cube(), 2, directions=64, progress=progress)
+    assert ("8/8" in screen.getvalue()) == (terminal and progress)
+    assert bool(screen.getvalue()) == (terminal and progress)
