@@ -25,7 +25,7 @@ $(BENCH_VENV)/installed: pyproject.toml
 	touch $@
 
 reproduce: $(VENV)/installed
-	$(bin)/python -m experiments run environment --preset $(PRESET)
+	$(bin)/python -m experiments run first_light environment --preset $(PRESET)
 
 test: $(VENV)/installed
 	$(bin)/python -m pytest -n auto --dist worksteal
