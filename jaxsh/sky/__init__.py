@@ -1,0 +1,41 @@
+"""The sky: radiance of daylight, its exact projection, and fits of it (Habel et al. 2008)."""
+
+from ._cie import cie_radiance
+from ._error import FitError, fit_error, smallest_luminance
+from ._export import c_header
+from ._fit import fit
+from ._ground import horizontal_irradiance, with_ground
+from ._habel import habel2008_fit, habel2008_monomials
+from ._hosek import hosek_radiance
+from ._preetham import preetham_radiance
+from ._preetham_fit import preetham_fit
+from ._project import project, project_preetham
+from ._sky_fit import SkyFit
+from ._sun import SUN_RADIUS, sun_harmonics, sun_radiance
+from ._table import preetham_harmonics, preetham_table
+from ._validity import SkyWarning
+
+__all__ = [
+    "SUN_RADIUS",
+    "FitError",
+    "SkyFit",
+    "SkyWarning",
+    "c_header",
+    "cie_radiance",
+    "fit",
+    "fit_error",
+    "habel2008_fit",
+    "habel2008_monomials",
+    "horizontal_irradiance",
+    "hosek_radiance",
+    "preetham_fit",
+    "preetham_harmonics",
+    "preetham_radiance",
+    "preetham_table",
+    "project",
+    "project_preetham",
+    "smallest_luminance",
+    "sun_harmonics",
+    "sun_radiance",
+    "with_ground",
+]

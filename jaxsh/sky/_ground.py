@@ -1,0 +1,63 @@
+"""A ground below the sky: the lower hemisphere as a diffuse surface lit from above."""
+
+import math
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ..harmonics import degree_of, index, num_coefficients
+from ..harmonics._checks import align, as_float, check_batches, is_concrete
+
+
+def horizontal_irradiance(
+    coefficients: Float[ArrayLike, "*batch k"],
+) -> Float[Array, "*batch"]:
+    """Irradiance of level ground, with its factor π, by a light from above alone.
+
+    Exact at any degree from 1 on, not only in the limit: where there is no light below the
+    horizon, the clamped cosine may be replaced by cos θ, and E = √(4π/3) c_10.
+    """
+    coefficients = as_float(coefficients)
+    if degree_of(coefficients.shape[-1] if coefficients.ndim else 0) < 1:
+        raise ValueError("irradiance needs a light of degree 1 or more, got degree 0")
+    return math.sqrt(4 * math.pi / 3) * coefficients[..., index(1, 0)]
+
+
+def with_ground(
+    light: Float[ArrayLike, "*batch c k"], albedo: Float[ArrayLike, "*albedos"]
+) -> Float[Array, "*out c k"]:
+    """A light from above and, below the horizon, diffuse ground that it lights: (..., C, K).
+
+    The lower hemisphere gets the constant radiance albedo/π · E, with E the light's own
+    `horizontal_irradiance`, and its coefficients in closed form. It lessens the jump at the
+    horizon, and so the ringing. `light` is that of sky, sun or their sum, without window and
+    without ground.
+
+    `albedo` is a number, one per channel (C,), or (..., C) in batches that broadcast with those
+    of the light. Bilinear, differentiable in both. Raises `ValueError` for an albedo whose value
+    is known and outside of [0, 1], and for a light of degree 0.
+    """
+    light = as_float(light)
+    irradiance = horizontal_irradiance(light)
+    if light.ndim < 2:
+        raise ValueError(f"expected a light (..., channels, K), got shape {light.shape}")
+    albedo = as_float(albedo).astype(light.dtype)
+    if is_concrete(albedo) and not np.all((np.asarray(albedo) >= 0) & (np.asarray(albedo) <= 1)):
+        raise ValueError(f"albedo must be in [0, 1], got {albedo}")
+    check_batches(light=light.shape, albedo=(*albedo.shape, 1))
+    radiance = jnp.multiply(*align(irradiance, albedo))[..., None] / math.pi
+    step = jnp.asarray(_lower_hemisphere(light.shape[-1]), light.dtype)
+    return jnp.add(*align(light, jnp.multiply(*align(radiance, step))))
+
+
+def _lower_hemisphere(count: int) -> Float[np.ndarray, " k"]:
+    """Coefficients of 1 below the horizon: zonal, from ∫_{-1}^0 P_l, zero for even l > 0."""
+    degree = degree_of(count)
+    coefficients = np.zeros(num_coefficients(degree))
+    for l in range(degree + 1):
+        antiderivative = np.polynomial.Legendre.basis(l).integ(lbnd=-1)
+        scale = 2 * math.pi * math.sqrt((2 * l + 1) / (4 * math.pi))
+        if l == 0 or l % 2:
+            coefficients[index(l, 0)] = scale * antiderivative(0.0)
+    return coefficients

@@ -1,0 +1,127 @@
+"""Hosek and Wilkie's sky (2012), from the tables that the installed `mitsuba` wheel carries."""
+
+import functools
+import importlib.util
+import math
+import pathlib
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ..harmonics._checks import align, check_batches
+from ._angles import angles, directions, parameter
+from ._tensor_file import read_tensors
+from ._validity import Check, check_option, check_range, check_sun
+
+# The tables hold the spectrum's integral with the colour matching: kcd/m² are 0.683 of it.
+_KILOLUMENS_PER_WATT = 0.683
+
+_FILE = pathlib.Path("data", "sunsky", "sunsky_datasets.bin")
+
+
+def hosek_radiance(
+    view: Float[ArrayLike, "*views 3"],
+    sun: Float[ArrayLike, "*suns 3"],
+    turbidity: Float[ArrayLike, "*turbidities"],
+    albedo: Float[ArrayLike, "*albedos"] = 0.3,
+    *,
+    check: Check = "raise",
+) -> Float[Array, "*out 3"]:
+    """Radiance of Hosek and Wilkie's sky without the sun's disc, linear sRGB in kcd/m²: (..., 3).
+
+    The model's own RGB fit, linear between the whole turbidities 1 to 10 and between the ground
+    albedos 0 and 1, and a quintic Bézier curve in the cube root of the sun's elevation. The
+    tables are read when first used from `mitsuba` (`pip install mitsuba`; it is not imported).
+
+    **Arguments**
+
+    - `view`, `sun`: (..., 3), of any length; `turbidity` (...) in [1, 10]; `albedo` (...) of the
+      ground in [0, 1], the same in each channel. Batches broadcast. Differentiable in all.
+    - `check`: what becomes of values beyond those ranges and of a sun below the horizon: raises,
+      warns or is allowed (the nearest value in range is then used).
+
+    Zero below the horizon. Kinks: the cones at the sun and the antisolar point, whole
+    turbidities; next to the horizon the derivatives grow without bound for the sun
+    (elevation^-2/3) and the view (cos^-1/2), and on it they are set to zero. Raises `ImportError`
+    where mitsuba is not installed.
+    """
+    check_option(check)
+    view, sun = directions(view, "view"), directions(sun, "sun")
+    dtype = jnp.result_type(view, sun)
+    turbidity, albedo = parameter(turbidity, dtype), parameter(albedo, dtype)
+    check_batches(
+        view=view.shape, sun=sun.shape, turbidity=(*turbidity.shape, 1), albedo=(*albedo.shape, 1)
+    )
+    check_range("turbidity", turbidity, check, 1.0, 10.0)
+    check_range("albedo", albedo, check, 0.0, 1.0)
+    check_sun(sun, check)
+    return _radiance(view, sun, turbidity, albedo, jnp.asarray(_tables(), dtype))
+
+
+@jax.jit
+def _radiance(view, sun, turbidity, albedo, tables):
+    turbidity, albedo, view, sun = align(turbidity[..., None], albedo[..., None], view, sun)
+    geometry = angles(view, sun)
+    parts = _interpolated(tables, geometry.theta_sun, turbidity[..., 0], albedo[..., 0])
+    channels = [_channel(part, geometry) for part in parts]
+    colour = _KILOLUMENS_PER_WATT * jnp.stack(jnp.broadcast_arrays(*channels), axis=-1)
+    return jnp.where((geometry.cos_view >= 0)[..., None], colour, 0)
+
+
+def _channel(parts, geometry):
+    """Hosek and Wilkie 2012, eqs. 8 and 9, times the mean radiance."""
+    a, b, c, d, e, f, g, h, i, mean = parts
+    cosine, cos_gamma = geometry.cos_view, geometry.cos_gamma
+    up = cosine > 0
+    root = jnp.where(up, jnp.sqrt(jnp.where(up, cosine, 1)), 0)
+    halo = (1 + cos_gamma * cos_gamma) / (1 + i * i - 2 * i * cos_gamma) ** 1.5
+    towards_horizon = 1 + a * jnp.exp(b / (jnp.where(up, cosine, 0) + 0.01))
+    around_sun = c + d * jnp.exp(e * geometry.gamma) + f * cos_gamma * cos_gamma
+    return towards_horizon * (around_sun + g * halo + h * root) * mean
+
+
+def _interpolated(tables, theta_sun, turbidity, albedo):
+    """Three channels of ten numbers each, every one an array of the suns' shape."""
+    elevation = math.pi / 2 - theta_sun
+    up = elevation > 0
+    along = jnp.where(up, jnp.cbrt(jnp.where(up, elevation, 1) / (math.pi / 2)), 0)
+    curve = [math.comb(5, k) * along**k * (1 - along) ** (5 - k) for k in range(6)]
+    turbidity, albedo = jnp.clip(turbidity, 1, 10), jnp.clip(albedo, 0, 1)
+    hats = [jnp.maximum(1 - jnp.abs(turbidity - k), 0) for k in range(1, 11)]
+    along, hats, albedo = (
+        jnp.stack(jnp.broadcast_arrays(*t), axis=-1) for t in (curve, hats, [1 - albedo, albedo])
+    )
+    along, hats, albedo = (
+        jnp.broadcast_to(t, (*_batch(along, hats, albedo), t.shape[-1]))
+        for t in (along, hats, albedo)
+    )
+    numbers = jnp.einsum(
+        "...t,...a,...e,taecp->cp...", hats, albedo, along, tables, precision="highest"
+    )
+    return [tuple(channel) for channel in numbers]
+
+
+def _batch(*arrays):
+    return jnp.broadcast_shapes(*(a.shape[:-1] for a in arrays))
+
+
+@functools.cache
+def _tables() -> Float[np.ndarray, "10 2 6 3 10"]:
+    """By turbidity, albedo, control point, channel: nine shape parameters and the mean."""
+    tensors = read_tensors(_table_path())
+    shapes, means = tensors["sky_params_rgb"], tensors["sky_rad_rgb"]
+    return np.concatenate([shapes, means[..., None]], axis=-1)
+
+
+def _table_path() -> pathlib.Path:
+    found = importlib.util.find_spec("mitsuba")
+    # Once imported, mitsuba puts an extension module of its own folder in its place.
+    origin = found.origin if found else None
+    if origin and (path := pathlib.Path(origin).parent / _FILE).is_file():
+        return path
+    raise ImportError(
+        "hosek_radiance reads its tables from the mitsuba package: `pip install mitsuba` "
+        f"brings them in {_FILE.as_posix()}"
+    )

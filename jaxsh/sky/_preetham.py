@@ -1,0 +1,116 @@
+"""The analytic daylight model of Preetham, Shirley and Smits 1999: radiance of the sky."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+from ..harmonics._checks import align, check_batches
+from ._angles import Angles, angles, directions, parameter
+from ._colour import Space, check_space, from_xyy
+from ._preetham_constants import Coefficients, Constants, Matrix, preetham_constants
+from ._validity import Check, check_luminance, check_option, check_sun, check_turbidity
+
+
+def preetham_radiance(
+    view: Float[ArrayLike, "*views 3"],
+    sun: Float[ArrayLike, "*suns 3"],
+    turbidity: Float[ArrayLike, "*turbidities"],
+    *,
+    constants: Constants = "paper",
+    space: Space = "srgb",
+    check: Check = "raise",
+) -> Float[Array, "*out 3"]:
+    """Radiance of the sky without the sun's disc, in kcd/m² (times 1000: cd/m²).
+
+    Preetham et al. 1999, appendix A.2, as Habel et al. 2008 use it: luminance Y and chromaticity
+    x, y, each its zenith value times F(θ, γ) / F(0, θ_s), with
+    F(θ, γ) = (1 + A exp(B/cos θ)) (1 + C exp(Dγ) + E cos²γ).
+
+    **Arguments**
+
+    - `view`, `sun`: (..., 3), vectors of any length towards sky and sun; `turbidity`: (...).
+      Batches broadcast. Differentiable in all three.
+    - `constants`: `"paper"`, the printed ones, or `"code"`, the set with five decimals that many
+      programs share. They differ by up to 0.6 % of the maximum at sunset.
+    - `space`: `"srgb"` (linear, Rec. 709 primaries), `"xyz"`, or `"xyY"`.
+    - `check`: what becomes of a turbidity outside of [1.7, 10], a sun below the horizon (by more
+      than rounding, 1e-6) and a negative luminance: `"raise"` a `ValueError`, `"warn"`
+      (`SkyWarning`) or `"allow"`. Only values known outside of `jit` and `grad` can be looked at.
+
+    **Returns** (..., 3), exactly zero below the horizon (z < 0). Nothing is clamped: blue in
+    linear sRGB turns negative near sunset, and the luminance itself below a turbidity of about
+    1.6 and for suns well below the horizon.
+
+    Derivatives are finite everywhere. Kinks: the cone of exp(Dγ) at the sun and the antisolar
+    point, and that of the zenith values where the sun stands in the zenith (the derivative along
+    a cone's axis is set to zero); the step at the horizon (that of the sky above is given).
+    """
+    preetham_constants(constants)
+    check_space(space)
+    check_option(check)
+    view, sun = directions(view, "view"), directions(sun, "sun")
+    turbidity = parameter(turbidity, jnp.result_type(view, sun))
+    check_batches(view=view.shape, sun=sun.shape, turbidity=(*turbidity.shape, 1))
+    check_turbidity(turbidity, check)
+    check_sun(sun, check)
+    result, luminance = _radiance(view, sun, turbidity, constants, space)
+    check_luminance(luminance, check)
+    return result
+
+
+@functools.partial(jax.jit, static_argnames=("constants", "space"))
+def _radiance(view, sun, turbidity, constants: Constants, space: Space):
+    """Colour and, for the check, luminance."""
+    table = preetham_constants(constants)
+    turbidity, view, sun = align(turbidity[..., None], view, sun)
+    geometry, turbidity = angles(view, sun), turbidity[..., 0]
+    luminance, x, y = (
+        zenith * _relative(coefficients, geometry, turbidity)
+        for zenith, coefficients in (
+            (zenith_luminance(geometry.theta_sun, turbidity), table.luminance),
+            (zenith_value(table.zenith_x, geometry.theta_sun, turbidity), table.x),
+            (zenith_value(table.zenith_y, geometry.theta_sun, turbidity), table.y),
+        )
+    )
+    above = geometry.cos_view >= 0
+    colour = jnp.where(above[..., None], from_xyy(x, y, luminance, space), 0)
+    return colour, jnp.where(above, luminance, 0)
+
+
+def zenith_luminance(
+    theta_sun: Float[Array, "..."], turbidity: Float[Array, "..."]
+) -> Float[Array, "..."]:
+    """Y_z in kcd/m² (appendix A.2)."""
+    chi = (4 / 9 - turbidity / 120) * (jnp.pi - 2 * theta_sun)
+    return (4.0453 * turbidity - 4.9710) * jnp.tan(chi) - 0.2155 * turbidity + 2.4192
+
+
+def zenith_value(matrix: Matrix, theta_sun, turbidity):
+    """x_z or y_z: (τ², τ, 1) · M · (θ³, θ², θ, 1)ᵀ."""
+    quadratic, linear, constant = (
+        ((row[0] * theta_sun + row[1]) * theta_sun + row[2]) * theta_sun + row[3] for row in matrix
+    )
+    return (quadratic * turbidity + linear) * turbidity + constant
+
+
+def _relative(coefficients: Coefficients, geometry: Angles, turbidity):
+    """F(θ, γ) / F(0, θ_s)."""
+    a, b, c, d, e = (slope * turbidity + intercept for slope, intercept in coefficients)
+    seen = gradation(a, b, geometry.cos_view)
+    seen = seen * indicatrix(c, d, e, geometry.gamma, geometry.cos_gamma)
+    zenith = (1 + a * jnp.exp(b)) * indicatrix(c, d, e, geometry.theta_sun, geometry.cos_sun)
+    return seen / zenith
+
+
+def gradation(a, b, cos_theta):
+    """1 + a exp(b/cos θ) for b < 0, and its limit 1 from the horizon downwards."""
+    # exp(b/c) is zero in every precision well before c is as small as this, and its derivative
+    # b/c² is still finite.
+    above = cos_theta > 1e-6
+    return 1 + a * jnp.where(above, jnp.exp(b / jnp.where(above, cos_theta, 1)), 0)
+
+
+def indicatrix(c, d, e, gamma, cos_gamma):
+    return 1 + c * jnp.exp(d * gamma) + e * cos_gamma * cos_gamma

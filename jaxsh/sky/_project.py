@@ -1,0 +1,175 @@
+"""Exact projection of a sky: coefficients of the hemisphere's radiance for given suns."""
+
+import functools
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ..harmonics import degrees, evaluate, orders, rotate_z
+from ..harmonics._checks import as_float, check_batches, flatten_batch
+from ..harmonics._indexing import check_degree
+from ._angles import directions, parameter
+from ._colour import Space, check_space
+from ._preetham import preetham_radiance
+from ._preetham_constants import Constants, preetham_constants
+from ._quadrature import sky_grid
+from ._validity import Check, check_option, check_sun, check_turbidity
+
+Model = Callable[..., Array]
+
+
+def project(
+    model: Model,
+    sun: Float[ArrayLike, "*suns 3"],
+    *parameters: Float[ArrayLike, "..."],
+    degree: int = 6,
+    symmetric: bool = False,
+) -> Float[Array, "*out channels k"]:
+    """Coefficients of any sky, integrated over the upper hemisphere: (..., C, K).
+
+    **Arguments**
+
+    - `model`: `model(view, sun, *parameters)` with view (n, 3) unit vectors, sun (3,) and each
+      parameter a scalar gives radiance (n, C). It is traced; pass the same function object to
+      have it compiled once.
+    - `sun`: (..., 3), of any length; `parameters`: (...) each. Batches broadcast. Differentiable
+      in all, the zenith included.
+    - `symmetric`: promise that the sky is its own mirror image in the plane of sun and zenith.
+      Half of the work, and with the sun at azimuth 0 the coefficients with m < 0 are exactly
+      zero. What the model closes over can then not be differentiated: pass it as a parameter.
+
+    The quadrature is graded to the sun, the antisolar point and the horizon (`_quadrature`).
+    Preetham's sky is right to 1e-12 of the norm in float64, tested to degree 32; a sky with
+    other edges, clouds for one, wants a quadrature of its own. The lower hemisphere is dark: see
+    `with_ground`.
+    """
+    sun = directions(sun, "sun")
+    numbers = tuple(parameter(p, sun.dtype) for p in parameters)
+    shapes = {f"parameter {i + 1}": (*p.shape, 1) for i, p in enumerate(numbers)}
+    check_batches(sun=sun.shape, **shapes)
+    batch = jnp.broadcast_shapes(sun.shape[:-1], *(p.shape for p in numbers))
+    rows = tuple(_rows(t, batch) for t in (sun, *(p[..., None] for p in numbers)))
+    coefficients = _project(rows, model, check_degree(degree), symmetric)
+    return coefficients.reshape(*batch, *coefficients.shape[1:])
+
+
+def _rows(array: Float[Array, "*some n"], batch: tuple[int, ...]) -> Float[Array, "rows n"]:
+    missing = len(batch) + 1 - array.ndim
+    array = array.reshape((1,) * missing + array.shape)
+    return flatten_batch(jnp.broadcast_to(array, (*batch, array.shape[-1])))
+
+
+def project_preetham(
+    sun: Float[ArrayLike, "*suns 3"],
+    turbidity: Float[ArrayLike, "*turbidities"],
+    degree: int = 6,
+    *,
+    constants: Constants = "paper",
+    space: Space = "srgb",
+    check: Check = "raise",
+) -> Float[Array, "*out 3 k"]:
+    """Coefficients of Preetham's sky without the sun's disc: (..., 3, K), kcd/m².
+
+    Exact: relative error below 1e-12 in float64 (see `project`). Arguments as for
+    `preetham_radiance`; `check` looks at sun and turbidity. Batches broadcast; differentiable in
+    both, the zenith included, where the model has a kink (see `preetham_radiance`).
+
+    With the sun at azimuth 0 the coefficients with m < 0 are exactly zero.
+    """
+    preetham_constants(constants)
+    check_space(space)
+    check_option(check)
+    sun = directions(sun, "sun")
+    turbidity = as_float(turbidity)
+    check_turbidity(turbidity, check)
+    check_sun(sun, check)
+    model = _preetham(constants, space)
+    return project(model, sun, turbidity, degree=degree, symmetric=True)
+
+
+@functools.cache
+def _preetham(constants: Constants, space: Space) -> Model:
+    return functools.partial(preetham_radiance, constants=constants, space=space, check="allow")
+
+
+@functools.partial(jax.jit, static_argnums=(1, 2, 3))
+def _project(rows, model: Model, degree: int, symmetric: bool):
+    one = _mirrored if symmetric else _whole
+
+    @jax.checkpoint  # in reverse, evaluate one sun's grid again rather than hold them all
+    def single(row):
+        sun, *numbers = row
+        return one(model, degree, sun, *(n[0] for n in numbers))
+
+    return jax.lax.map(single, rows)
+
+
+def _whole(model, degree, sun, *parameters):
+    return _integrate(model, degree, sun, parameters, symmetric=False)
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(0, 1))
+def _mirrored(model, degree, sun, *parameters):
+    return _integrate(model, degree, sun, parameters, symmetric=True)
+
+
+@_mirrored.defjvp
+def _mirrored_jvp(model, degree, primals, tangents):
+    # A sun that leaves the plane breaks the symmetry: derivatives need both halves.
+    return jax.jvp(functools.partial(_whole, model, degree), primals, tangents)
+
+
+def _integrate(model, degree, sun, parameters, *, symmetric: bool, refine: int = 1):
+    """One sun: (3,) and scalars -> (C, K).
+
+    Where the nodes stand is a choice and carries no derivative: that of the integral is the
+    integral of the derivative. So the sun's azimuth is never differentiated, which at the zenith
+    has no derivative.
+    """
+    fixed = jax.lax.stop_gradient(sun)
+    azimuth = jnp.atan2(fixed[1], fixed[0])
+    theta_sun = jnp.atan2(jnp.sqrt(fixed[0] ** 2 + fixed[1] ** 2), fixed[2])
+    grid = sky_grid(theta_sun, degree, symmetric=symmetric, refine=refine)
+    sin_theta, cos_theta = jnp.sin(grid.theta)[:, None], jnp.cos(grid.theta)[:, None]
+    cos_phi, sin_phi = jnp.cos(azimuth), jnp.sin(azimuth)
+    ahead, aside = (jnp.asarray(f(grid.phi), sun.dtype)[None] * sin_theta for f in (np.cos, np.sin))
+    views = jnp.stack(
+        [
+            cos_phi * ahead - sin_phi * aside,
+            sin_phi * ahead + cos_phi * aside,
+            jnp.broadcast_to(cos_theta, ahead.shape),
+        ],
+        axis=-1,
+    )
+    views = views.reshape(-1, 3)
+    values = model(views, sun, *parameters)
+    if values.ndim != 2 or len(values) != len(views):
+        raise ValueError(
+            f"a model must return radiance (n, channels) for n = {len(views)} views, got shape "
+            f"{values.shape}"
+        )
+    moments = _along_azimuth(values.reshape(*ahead.shape, -1), grid, degree, symmetric)
+    profiles = _profiles(grid.theta, degree) * grid.theta_weights[None]
+    coefficients = jnp.einsum("tck,kt->ck", moments, profiles, precision="highest")
+    return rotate_z(coefficients, azimuth)
+
+
+def _along_azimuth(values, grid, degree: int, symmetric: bool):
+    """∫ f(θ, φ) cos mφ dφ or, for m < 0, sin |m|φ: (T, P, C) -> (T, C, K)."""
+    m = np.arange(-degree, degree + 1)[:, None]
+    sine = np.zeros_like(grid.phi)[None] if symmetric else np.sin(-m * grid.phi)
+    waves = np.where(m < 0, sine, np.cos(m * grid.phi)) * grid.phi_weights
+    waves = jnp.asarray(waves, values.dtype)
+    moments = jnp.einsum("tpc,mp->tcm", values, waves, precision="highest")
+    return moments[..., orders(degree) + degree]
+
+
+def _profiles(theta: Float[Array, " t"], degree: int) -> Float[Array, "k t"]:
+    """y_l|m| on the meridian φ = 0, where it is its own amplitude."""
+    zero = jnp.zeros_like(theta)
+    basis = evaluate(jnp.stack([jnp.sin(theta), zero, jnp.cos(theta)], axis=-1), degree, axis=0)
+    l, m = degrees(degree), orders(degree)
+    return basis[l * (l + 1) + np.abs(m)]

@@ -1,0 +1,134 @@
+"""A fitted sky: coefficients as a closed form of the sun and the sky's parameters."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ..harmonics._checks import align, check_batches, is_concrete
+from ..harmonics._indexing import check_degree
+from ._angles import directions, parameter, unit
+from ._azimuth import row_of_each, squared_zenith_angle, waves, zenith_angle
+from ._chebyshev import Axis, chebyshev, tensor
+
+Prefactor = Callable[..., Array]
+
+
+class SkyFit(eqx.Module):
+    """A sky's coefficients as Chebyshev series in the sun's height and the sky's parameters.
+
+    c_lm = w_m Σ_q mix_q p_q Σ_ij a_qlm,ij T_i(u) T_j(v)…, for m ≥ 0 at azimuth 0; eq. 4 of Habel
+    et al. 2008 turns it to the sun. With `parity`, u is θ² scaled to [-1, 1] and w_m = sin^m θ,
+    so that together with cos mφ it is a polynomial of the sun's x and y: as smooth at the zenith
+    as the sky is. Without it u is θ itself and w_m = 1, as in the paper.
+
+    `coefficients` a: (channels, rows, *terms), one row for each (l, m ≥ 0); `mix`: from fitted
+    quantities to the sky's channels; `prefactor`: p(sun, *parameters) -> (n, channels), or none;
+    `axes`: the variables and their ranges; `solution`: what the solver says, or none for a
+    stored fit. Made by `fit`.
+    """
+
+    coefficients: Float[Array, "channels rows ..."]
+    mix: Float[Array, "out channels"]
+    axes: tuple[Axis, ...] = eqx.field(static=True)
+    parity: bool = eqx.field(static=True)
+    prefactor: Prefactor | None = eqx.field(static=True, default=None)
+    solution: Any = None
+
+    def __call__(
+        self, sun: Float[ArrayLike, "*suns 3"], *parameters: Float[ArrayLike, "..."]
+    ) -> Float[Array, "*out channels k"]:
+        """Coefficients (..., C, K) for suns (..., 3), of any length, and parameters (...) each.
+
+        Batches broadcast; in the sun's dtype. Differentiable in everything; with `parity` and no
+        prefactor that has a kink there, the zenith included, and else with the derivative of the
+        kink's terms set to zero there.
+
+        Outside of the fitted range: a `ValueError` where values are known, else NaN. Nothing is
+        extrapolated.
+        """
+        sun = directions(sun, "sun")
+        if len(parameters) != len(self.axes) - 1:
+            names = ", ".join(axis.name for axis in self.axes[1:]) or "none"
+            raise ValueError(f"expected as parameters {names}, got {len(parameters)}")
+        numbers = tuple(parameter(value, sun.dtype) for value in parameters)
+        shapes = {
+            axis.name: (*value.shape, 1) for axis, value in zip(self.axes[1:], numbers, strict=True)
+        }
+        check_batches(sun=sun.shape, **shapes)
+        self._check_range(sun, numbers)
+        return _evaluate(self, sun, numbers)
+
+    @property
+    def degree(self) -> int:
+        """Of the harmonics: rows = (degree + 1)(degree + 2)/2."""
+        return (int(np.sqrt(8 * self.coefficients.shape[1] + 1)) - 3) // 2
+
+    def truncated(self, degree: int) -> "SkyFit":
+        """The same for a lower degree: its bands and no work for others."""
+        if not check_degree(degree) <= self.degree:
+            raise ValueError(f"the fit is of degree {self.degree}, got degree {degree}")
+        rows = (degree + 1) * (degree + 2) // 2
+        return eqx.tree_at(lambda f: f.coefficients, self, self.coefficients[:, :rows])
+
+    def _check_range(self, sun, numbers):
+        if is_concrete(sun):
+            x, y, z = np.moveaxis(np.asarray(sun, np.float64), -1, 0)
+            theta = np.arctan2(np.hypot(x, y), z)
+            bad = ~self.axes[0].holds(theta**2 if self.parity else theta)
+            if bad.any():
+                high = np.sqrt(self.axes[0].high) if self.parity else self.axes[0].high
+                raise ValueError(
+                    f"fitted for suns up to {np.degrees(high):g} degrees from the zenith, got "
+                    f"{np.degrees(theta[bad].flat[0]):g}"
+                )
+        for axis, value in zip(self.axes[1:], numbers, strict=True):
+            if is_concrete(value):
+                array = np.asarray(value)
+                bad = ~axis.holds(array)
+                if bad.any():
+                    raise ValueError(
+                        f"fitted for {axis.name} in [{axis.low:g}, {axis.high:g}], got "
+                        f"{array[bad].flat[0]:g}"
+                    )
+
+
+@jax.jit
+def _evaluate(fit: SkyFit, sun, parameters):
+    batch = jnp.broadcast_shapes(sun.shape[:-1], *(p.shape for p in parameters))
+    suns = _rows(unit(sun), (*batch, 3)).reshape(math.prod(batch), 3)
+    numbers = [_rows(p, batch).ravel() for p in parameters]
+    x, y, z = suns.T
+    height = (squared_zenith_angle if fit.parity else zenith_angle)(x, y, z)
+    variables = [height, *numbers]
+
+    channels, rows, *terms = fit.coefficients.shape
+    basis = design(fit.axes, variables, terms)
+    series = fit.coefficients.reshape(channels * rows, len(basis)).astype(sun.dtype)
+    values = jnp.matmul(series, basis, precision="highest").reshape(channels, rows, len(x))
+    if fit.prefactor is not None:
+        values = values * fit.prefactor(suns, *numbers).T[:, None]
+    values = jnp.einsum("oc,crn->orn", fit.mix.astype(sun.dtype), values, precision="highest")
+    turned = values[:, row_of_each(fit.degree)] * waves(x, y, fit.degree, smooth=fit.parity)[None]
+    inside = jnp.stack([axis.holds(v) for axis, v in zip(fit.axes, variables, strict=True)])
+    turned = jnp.where(inside.all(axis=0)[None, None], turned, jnp.nan)
+    return jnp.moveaxis(turned, -1, 0).reshape(*batch, len(fit.mix), len(turned[0]))
+
+
+def design(axes, variables, terms) -> Float[Array, "terms n"]:
+    """The tensor Chebyshev basis at given values of the variables: one for all the weights."""
+    return tensor(
+        [
+            chebyshev(axis.scaled(value), count)
+            for axis, value, count in zip(axes, variables, terms, strict=True)
+        ]
+    )
+
+
+def _rows(array, shape):
+    return jnp.broadcast_to(align(array, jnp.zeros(shape))[0], shape)

@@ -1,0 +1,88 @@
+"""Many linear least-squares problems with one design, by the solvers that nonlinear ones take."""
+
+from typing import Any, Literal, get_args
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import lineax as lx
+import optimistix as optx
+from jaxtyping import Array, Float, Int
+
+Solver = Literal["gauss-newton", "levenberg-marquardt", "qr"] | optx.AbstractLeastSquaresSolver
+
+
+class Solution(eqx.Module):
+    """What a solver says of its work.
+
+    `residual` is the weighted residual's norm relative to that of the data, over all problems;
+    `steps` and `result` are those of the problem that took the most steps or failed.
+    """
+
+    residual: Float[Array, ""]
+    steps: Int[Array, ""]
+    result: Any  # an optimistix.RESULTS
+
+    @property
+    def converged(self) -> bool:
+        return bool(self.result == optx.RESULTS.successful)
+
+
+def least_squares(
+    design: Float[Array, "samples terms"],
+    targets: Float[Array, "problems samples"],
+    scales: Float[Array, "problems samples"],
+    *,
+    solver: Solver = "gauss-newton",
+    max_steps: int = 256,
+) -> tuple[Float[Array, "problems terms"], Solution]:
+    """Minimises ‖scales·(A c) − targets‖² over c, for each problem.
+
+    `solver` is an Optimistix least-squares solver, or a name: `"gauss-newton"` and
+    `"levenberg-marquardt"` with a lineax QR and a tolerance of √ε, or `"qr"`, the linear solution
+    in one step, to check the others by. Does not raise where a solver fails: see `Solution`.
+    """
+    values, steps, results = _solve(
+        design, targets, scales, _named(solver, design.dtype), max_steps
+    )
+    fitted = jnp.matmul(values, design.T, precision="highest")
+    residual = jnp.linalg.norm(scales * fitted - targets) / jnp.linalg.norm(targets)
+    failed = results != optx.RESULTS.successful
+    worst = jnp.argmax(failed) if failed.any() else jnp.argmax(steps)
+    result = jax.tree.map(lambda a: a[worst], results)
+    return values, Solution(residual, steps[worst], result)
+
+
+def message(solution: Solution) -> str:
+    return optx.RESULTS[solution.result] or "successful"
+
+
+def _named(solver: Solver, dtype):
+    tolerance = float(jnp.finfo(dtype).eps) ** 0.5
+    match solver:
+        case "gauss-newton":
+            return optx.GaussNewton(tolerance, tolerance, linear_solver=lx.QR())
+        case "levenberg-marquardt":
+            return optx.LevenbergMarquardt(tolerance, tolerance, linear_solver=lx.QR())
+        case "qr" | optx.AbstractLeastSquaresSolver():
+            return solver
+    names = ", ".join(get_args(get_args(Solver)[0]))
+    raise ValueError(f"solver must be one of {names} or of Optimistix, got {solver!r}")
+
+
+@eqx.filter_jit
+def _solve(design, targets, scales, solver, max_steps):
+    def linear(target, scale):
+        operator = lx.MatrixLinearOperator(scale[:, None] * design)
+        solution = lx.linear_solve(operator, target, lx.QR(), throw=False)
+        return solution.value, jnp.ones((), jnp.int32), optx.RESULTS.promote(solution.result)
+
+    def iterative(target, scale):
+        def residual(c, _):
+            return scale * jnp.matmul(design, c, precision="highest") - target
+
+        start = jnp.zeros(design.shape[-1], design.dtype)
+        solution = optx.least_squares(residual, solver, start, max_steps=max_steps, throw=False)
+        return solution.value, solution.stats["num_steps"], solution.result
+
+    return jax.vmap(linear if solver == "qr" else iterative)(targets, scales)

@@ -1,0 +1,66 @@
+"""Where a sky model holds, said before it is used beyond."""
+
+import warnings
+from typing import Literal, get_args
+
+import numpy as np
+from jaxtyping import Array
+
+from ..harmonics._checks import is_concrete
+
+Check = Literal["raise", "warn", "allow"]
+
+# Sines of elevation that rounding may turn negative for a sun on the horizon.
+_ROUNDING = 1e-6
+
+
+class SkyWarning(UserWarning):
+    """A sky model used outside of the range that it holds in."""
+
+
+def check_turbidity(turbidity: Array, check: Check) -> None:
+    check_range("turbidity", turbidity, check, 1.7, 10.0)
+
+
+def check_range(name: str, value: Array, check: Check, low: float, high: float) -> None:
+    if check == "allow" or not is_concrete(value):
+        return
+    values = np.asarray(value, np.float64)
+    # Compared in the values' own precision: 1.7 in float32 is in the range.
+    slack = float(np.finfo(value.dtype).eps) * high
+    bad = ~((values >= low - slack) & (values <= high + slack))
+    if bad.any():
+        _say(f"{name} must be in [{low:g}, {high:g}], got {values[bad].flat[0]:g}", check)
+
+
+def check_sun(sun: Array, check: Check) -> None:
+    if check == "allow" or not is_concrete(sun):
+        return
+    vectors = np.asarray(sun, np.float64)
+    sine = vectors[..., 2] / np.linalg.norm(vectors, axis=-1)
+    bad = ~(sine >= -_ROUNDING)
+    if bad.any():
+        elevation = np.degrees(np.arcsin(sine[bad].flat[0]))
+        _say(f"the sun must be at 0 to 90 degrees above the horizon, got {elevation:g}", check)
+
+
+def check_luminance(luminance: Array, check: Check) -> None:
+    if check == "allow" or not is_concrete(luminance):
+        return
+    values = np.asarray(luminance)
+    bad = values < 0
+    if bad.any():
+        _say(
+            f"the sky's luminance must be at least 0, but the model gives {values[bad][0]:g}", check
+        )
+
+
+def check_option(check: str) -> None:
+    if check not in get_args(Check):
+        raise ValueError(f"check must be one of {', '.join(get_args(Check))}, got {check!r}")
+
+
+def _say(what: str, check: Check) -> None:
+    if check == "raise":
+        raise ValueError(f'{what}; check="warn" or "allow" computes it all the same')
+    warnings.warn(what, SkyWarning, stacklevel=4)
