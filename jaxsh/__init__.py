@@ -15,11 +15,12 @@ if _TYPE_CHECKING:
     from . import geometry as geometry
     from . import harmonics as harmonics
     from . import imaging as imaging
+    from . import inverse as inverse
     from . import sky as sky
     from . import sphere as sphere
     from . import transfer as transfer
 
-__all__ = ["geometry", "harmonics", "imaging", "sky", "sphere", "transfer"]
+__all__ = ["geometry", "harmonics", "imaging", "inverse", "sky", "sphere", "transfer"]
 __version__ = "0.1.0"
 
 

@@ -1,0 +1,11 @@
+"""Shading read backwards: the light that made the colours of a surface, and how surely.
+
+Every fit gives one `Recovered`: value, result code, statistics and confidence. Each starts from
+many places at once, so that it does not end in the wrong valley, and none that has not converged
+stays silent.
+"""
+
+from ._fit_sky import SkyLight, fit_sky
+from ._result import Confidence, Recovered, Statistics
+
+__all__ = ["Confidence", "Recovered", "SkyLight", "Statistics", "fit_sky"]

@@ -1,0 +1,242 @@
+"""Sun and turbidity from the shaded vertices of a mesh."""
+
+import functools
+import math
+import operator
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, ArrayLike, Float
+
+from .. import sky as sky_room
+from ..harmonics._checks import as_float, is_concrete
+from ..transfer import Transfer
+from ._charts import even_hemisphere, from_hemisphere, tangents, to_hemisphere, to_interval
+from ._result import Confidence, Recovered, Statistics
+from ._shading import Shading, compress
+from ._solve import covariance, levenberg_marquardt
+
+Sky = Callable[..., Array]
+
+# How close to a bound is on it: a share of the turbidity's range, the sine of the sun's height.
+_AT_BOUND = 1e-5
+
+
+class SkyLight(eqx.Module):
+    """What the sky is known by: sun (3,), a unit vector; turbidity; exposure.
+
+    In a `Confidence` the deviations of each: √(x² + y² + z²) of the sun's is the RMS angle, in
+    radians, by which it may be off.
+    """
+
+    sun: Float[Array, " 3"]
+    turbidity: Float[Array, ""]
+    exposure: Float[Array, ""]
+
+
+def fit_sky(
+    observed: Float[ArrayLike, "v 3"],
+    transfer: Transfer,
+    albedo: Float[ArrayLike, "..."],
+    *,
+    sky: Sky | None = None,
+    turbidity: tuple[float, float] = (2.5, 6.0),
+    exposure: float | None = 1.0,
+    weights: Float[ArrayLike, " v"] | None = None,
+    starts: int = 24,
+    tolerance: float | None = None,
+    max_steps: int = 512,
+    throw: bool = True,
+) -> Recovered[SkyLight]:
+    """The sun's direction and the turbidity that shaded a diffuse mesh so, by least squares.
+
+    Minimises Σ_v w_v² ‖observed_v − exposure · shade_diffuse(sky(sun, turbidity))_v‖² with
+    Levenberg and Marquardt's method. The sky's own light alone: take away what the sun's disc
+    adds, or give a `sky` that has it.
+
+    **Arguments**
+
+    - `observed`: radiance (V, 3) that leaves the vertices, linear, in kcd/m² if `exposure` is
+      to be 1. `transfer`, `albedo`: as for `transfer.shade_diffuse`.
+    - `sky`: `sky(sun, turbidity) -> (3, K)` of the transfer's degree or below, differentiable
+      by JAX in forward mode; pass the same function object to have it compiled once. By default
+      `sky.preetham_harmonics` at the transfer's degree, or at 6 where that is higher.
+    - `turbidity`: its bounds. The default sky takes them from [2, 10].
+    - `exposure`: a known factor, or None to recover it too.
+    - `weights`: of each vertex (V,), one over the expected error, at least 0. Vertices that are
+      not observed have weight 0, and may then hold any number.
+    - `starts`: the sun's first directions, spread over the hemisphere, with turbidities in turn
+      at the quarters of the range. The best end of all is taken.
+    - `tolerance`: of the last step, absolute and relative; 1e-5, and √ε in float32, by default.
+    - `throw`: raise `RuntimeError` where the solver did not converge. Inside `jit` nothing can
+      be raised, and with False nothing is: then look at the `result`.
+
+    **Returns** a `Recovered` with a `SkyLight`, in the transfer's dtype. `jit` and `vmap` as you
+    like; not differentiable.
+
+    Parameters are free of bounds and of the zenith's singularity (`_charts`). A sun on the horizon
+    and a turbidity at its bound are reached, in more steps. Within a degree of the zenith most
+    starts end on the kink that the model has there; the others find the sun. An exposure is
+    positive, and with it free all that brightness tells is lost; see what `confidence` says.
+
+    Raises `ValueError` for shapes that do not fit, and, where values are known, for data that
+    are not finite, all zero, or weighted by less than 0.
+    """
+    coefficients = transfer.coefficients
+    dtype, count = coefficients.dtype, len(coefficients)
+    observed, albedo = as_float(observed).astype(dtype), as_float(albedo).astype(dtype)
+    weights = jnp.ones(count, dtype) if weights is None else as_float(weights).astype(dtype)
+    _check_shapes(observed, albedo, weights, count)
+    _check_values(observed, weights)
+    low, high = turbidity
+    if not 0 < low < high < math.inf:
+        raise ValueError(f"turbidity must be bounds 0 < low < high, got {turbidity}")
+    if exposure is not None and not 0 < exposure < math.inf:
+        raise ValueError(f"exposure must be positive, or None to recover it, got {exposure}")
+    if operator.index(starts) < 1:
+        raise ValueError(f"a fit needs at least 1 start, got {starts}")
+    if sky is None:
+        sky = _preetham(min(transfer.degree, 6), low >= 2.5 and high <= 6)
+    recovered = _fit(
+        observed,
+        coefficients,
+        albedo,
+        weights,
+        sky=sky,
+        bounds=(float(low), float(high)),
+        exposure=exposure,
+        starts=starts,
+        tolerance=_tolerance(dtype) if tolerance is None else tolerance,
+        max_steps=max_steps,
+    )
+    if throw and is_concrete(recovered.statistics.steps) and not recovered.converged:
+        raise RuntimeError(
+            f"the sky was not found in {int(recovered.statistics.steps)} steps from "
+            f"{starts} starts, residual {float(recovered.statistics.residual):.1e}: "
+            f"{recovered.message} throw=False gives the best that was met"
+        )
+    return recovered
+
+
+def _tolerance(dtype) -> float:
+    """Of the last step. Where steps converge as Newton's do, the next one is about its square."""
+    return max(1e-5, float(jnp.finfo(dtype).eps) ** 0.5)
+
+
+@functools.cache
+def _preetham(degree: int, narrow: bool) -> Sky:
+    table = None if narrow else "wide"
+    return functools.partial(sky_room.preetham_harmonics, degree=degree, table=table)
+
+
+@eqx.filter_jit
+def _fit(
+    observed, coefficients, albedo, weights, *, sky, bounds, exposure, starts, tolerance, max_steps
+) -> Recovered[SkyLight]:
+    shading = compress(observed, coefficients, albedo, weights)
+
+    def decode(p) -> SkyLight:
+        factor = jnp.asarray(exposure, p.dtype) if exposure is not None else jnp.exp(p[3])
+        return SkyLight(to_hemisphere(p[:2]), to_interval(p[2], *bounds), factor)
+
+    first = _starts(starts, observed.dtype)
+    if exposure is None:
+        brightness = jax.vmap(lambda p: _brightness(shading, sky, to_sky(p, bounds)))(first)
+        first = jnp.concatenate([first, jnp.log(brightness)[:, None]], axis=1)
+    solved = levenberg_marquardt(
+        lambda p: _residual(shading, sky, decode(p)),
+        first,
+        tolerance=tolerance,
+        max_steps=max_steps,
+    )
+    value = decode(solved.parameters)
+    squared = jnp.sum(solved.residual**2)
+    low, high = bounds
+    edge = _AT_BOUND * (high - low)
+    statistics = Statistics(
+        steps=solved.steps,
+        residual=jnp.sqrt(squared),
+        agreeing=solved.agreeing,
+        starts=starts,
+        at_bound=(value.turbidity < low + edge)
+        | (value.turbidity > high - edge)
+        | (value.sun[2] < _AT_BOUND),
+    )
+    free = 3 * jnp.sum(weights > 0) - first.shape[1]
+    variance = squared / jnp.maximum(free, 1).astype(squared.dtype)
+    confidence = _confidence(shading, sky, value, variance, exposure is None)
+    return Recovered(value, solved.result, statistics, confidence)
+
+
+def to_sky(p: Float[Array, " p"], bounds: tuple[float, float]) -> SkyLight:
+    """Free numbers to a sky of exposure 1."""
+    return SkyLight(to_hemisphere(p[:2]), to_interval(p[2], *bounds), jnp.ones((), p.dtype))
+
+
+def _residual(shading: Shading, sky: Sky, light: SkyLight) -> Float[Array, " r"]:
+    return shading.residual(light.exposure * sky(light.sun, light.turbidity)).ravel()
+
+
+def _brightness(shading: Shading, sky: Sky, light: SkyLight) -> Float[Array, ""]:
+    """The exposure that fits this sky best, or 1 where that is not positive."""
+    target = shading.target.ravel()
+    shaded = _residual(shading, sky, light) + target
+    along, own = jnp.sum(shaded * target), jnp.sum(shaded * shaded)
+    return jnp.where((along > 0) & (own > 0), along / jnp.where(own > 0, own, 1), 1)
+
+
+def _starts(count: int, dtype) -> Float[Array, "s 3"]:
+    suns = from_hemisphere(even_hemisphere(count))
+    # sin p = ±1/2 at the quarters of the range.
+    quarter = math.pi / 6 * (-1.0) ** np.arange(count)
+    return jnp.asarray(np.column_stack([suns, quarter]), dtype)
+
+
+def _confidence(shading, sky, value: SkyLight, variance, free: bool) -> Confidence[SkyLight]:
+    """With steps on the sphere itself, which unlike the charts have no edge and no fold."""
+    along = tangents(value.sun)
+
+    def moved(step) -> SkyLight:
+        sun = value.sun + jnp.matmul(step[:2], along, precision="highest")
+        factor = value.exposure * jnp.exp(step[3]) if free else value.exposure
+        return SkyLight(sun, value.turbidity + step[2], factor)
+
+    still = jnp.zeros(3 + free, value.sun.dtype)
+    jacobian = jax.jacfwd(lambda step: _residual(shading, sky, moved(step)))(still)
+    carried = jax.jacfwd(lambda step: ravel_pytree(moved(step))[0])(still)
+    spread = covariance(jacobian, variance)
+    whole = jnp.isfinite(spread).all()
+    spread = jnp.where(whole, spread, 0)
+    spread = jnp.einsum("ip,pq,jq->ij", carried, spread, carried, precision="highest")
+    spread = jnp.where(whole, spread, jnp.inf)
+    _, unravel = ravel_pytree(value)
+    return Confidence(spread, unravel(jnp.sqrt(jnp.maximum(jnp.diagonal(spread), 0))))
+
+
+def _check_shapes(observed, albedo, weights, count: int) -> None:
+    if observed.shape != (count, 3):
+        raise ValueError(f"expected observed ({count}, 3), got shape {observed.shape}")
+    if albedo.shape not in ((), (3,), (count, 1), (count, 3)):
+        raise ValueError(
+            f"expected albedo as a number, (3,), ({count}, 1) or ({count}, 3), got shape "
+            f"{albedo.shape}"
+        )
+    if weights.shape != (count,):
+        raise ValueError(f"expected weights ({count},), got shape {weights.shape}")
+
+
+def _check_values(observed: Array, weights: Array) -> None:
+    if not (is_concrete(observed) and is_concrete(weights)):
+        return
+    numbers, trust = np.asarray(observed), np.asarray(weights)
+    if not (np.isfinite(trust) & (trust >= 0)).all():
+        raise ValueError("weights must be finite and at least 0")
+    bad = int((~np.isfinite(numbers[trust > 0])).sum())
+    if bad:
+        raise ValueError(f"{bad} numbers of observed are NaN or infinite: give them weight 0")
+    if not np.any(numbers[trust > 0]):
+        raise ValueError("observed is zero wherever it has a weight: there is no light to recover")

@@ -1,0 +1,55 @@
+"""Diffuse shading, made small: as many equations as the light has coefficients."""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+
+class Shading(eqx.Module):
+    """w (observed - albedo/π · T L) of every vertex, turned until few rows hold all of it.
+
+    Shading is linear in the light. With [w albedo/π T | w observed] = Q [R | b] in each channel,
+    ‖w (observed - albedo/π · T L)‖ = ‖b - R L‖ exactly, so that what a fit does in each step does
+    not depend on the number of vertices. Q is never formed. In units of ‖w observed‖.
+    """
+
+    target: Float[Array, "3 r"]
+    operator: Float[Array, "c r k"]  # c is 1 where all channels have one albedo
+    scale: Float[Array, ""]
+
+    def residual(self, light: Float[Array, "3 k"]) -> Float[Array, "3 r"]:
+        """Of a light of the operator's degree or below."""
+        operator = self.operator[..., : light.shape[-1]]
+        operator = jnp.broadcast_to(operator, (3, *operator.shape[1:]))
+        shaded = jnp.einsum("crk,ck->cr", operator, light, precision="highest")
+        return shaded / self.scale - self.target
+
+
+def compress(
+    observed: Float[Array, "v 3"],
+    coefficients: Float[Array, "v k"],
+    albedo: Float[Array, "..."],
+    weights: Float[Array, " v"],
+) -> Shading:
+    """`albedo` is a number, (3,), (V, 1) or (V, 3)."""
+    # Where nothing weighs, nothing need be known.
+    seen = jnp.where(weights[:, None] > 0, weights[:, None] * observed, 0)
+    norm = jnp.linalg.norm(seen)
+    scale = jnp.where(norm > 0, norm, 1)
+    shared = albedo.ndim == 0 or albedo.shape[-1] == 1
+    albedo = albedo.reshape((1,) * (2 - albedo.ndim) + albedo.shape)
+    albedo = jnp.broadcast_to(albedo, (len(seen), 1 if shared else 3))
+    count = coefficients.shape[-1]
+
+    def triangle(row):
+        reflected, b = row
+        shading = (weights * reflected / math.pi)[:, None] * coefficients
+        return jnp.linalg.qr(jnp.concatenate([shading, b], axis=1), mode="r")
+
+    columns = (seen / scale)[None] if shared else (seen / scale).T[..., None]
+    triangles = jax.lax.map(triangle, (albedo.T, columns))
+    operator, target = triangles[..., :count], triangles[..., count:]
+    return Shading(jnp.moveaxis(target, -1, 0 if shared else 1).reshape(3, -1), operator, scale)
