@@ -1,12 +1,14 @@
 """Where an experiment's meshes and environments come from."""
 
 import os
+import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ._errors import UserError, unknown
 
 if TYPE_CHECKING:
+    import numpy as np
     from jax import Array
 
     from jaxsh.geometry import Mesh
@@ -17,12 +19,12 @@ _SUFFIX = {"meshes": ".ply", "envmaps": ".exr"}
 
 
 class Data:
-    """Meshes and environments by name.
+    """Meshes and environments by name, and published numbers where they are at hand.
 
     They come from a folder with ``meshes/*.ply`` and ``envmaps/*.exr`` (lat-long, this package's
-    orientation). Without a folder an embedded default serves, made at run time: the mesh "knot",
-    a trefoil that shadows itself, and the environment "studio", a soft room with a small bright
-    lamp.
+    orientation), and may hold ``reference/*.npz``. Without a folder an embedded default serves,
+    made at run time: the mesh "knot", a trefoil that shadows itself, and the environment "studio",
+    a soft room with a small bright lamp.
     """
 
     def __init__(self, folder: Path | None = None):
@@ -71,6 +73,16 @@ class Data:
             return imaging.studio()
         return _read(imaging.read_environment, path)
 
+    def reference(self, name: str) -> "dict[str, np.ndarray] | None":
+        """Published numbers to compare with, arrays by name from ``reference/<name>.npz``.
+
+        None where the folder has none: they are not ours to embed.
+        """
+        path = self.folder and self.folder / "reference" / f"{name}.npz"
+        if path is None or not path.exists():
+            return None
+        return _read(_arrays, path)
+
     def _names(self, kind: str) -> list[str]:
         if self.folder is None:
             return _EMBEDDED[kind]
@@ -83,6 +95,17 @@ class Data:
             noun = {"meshes": "mesh", "envmaps": "environment"}[kind]
             raise unknown(noun, name, names, where=self.source)
         return self.folder and self.folder / kind / f"{name}{_SUFFIX[kind]}"
+
+
+def _arrays(path: Path) -> "dict[str, np.ndarray]":
+    import numpy as np
+
+    try:
+        # NumPy leaves a file that it opened itself open where the archive in it is torn.
+        with path.open("rb") as file, np.load(file) as stored:
+            return dict(stored)
+    except (EOFError, TypeError, ValueError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path} holds no arrays: {error}") from error
 
 
 def _read(read, path: Path):

@@ -1,0 +1,101 @@
+"""The pictures of `inverse.sky`."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxsh import geometry, imaging, inverse, sky
+
+_DOME = 160
+
+
+class Case(NamedTuple):
+    """One level of noise: what was observed, and what was made of it."""
+
+    noise: float
+    observed: Float[Array, "v 3"]
+    found: inverse.Recovered[inverse.SkyLight]
+
+
+def draw_errors(path: Path, rows: list[dict[str, Any]]) -> None:
+    """Error of sun and turbidity by noise, and the deviations that the fits gave."""
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    levels = sorted({row["noise"] for row in rows})
+    places = np.arange(len(levels))
+    for axis, key, goal, unit in zip(
+        axes, ("sun", "turbidity"), (0.1, 0.02), ("sun, degrees", "turbidity"), strict=True
+    ):
+        said = []
+        for place, level in zip(places, levels, strict=True):
+            of = [row for row in rows if row["noise"] == level]
+            errors = np.array([row[f"{key}_error"] for row in of])
+            spread = np.linspace(-0.15, 0.15, len(errors))
+            axis.plot(place + spread, np.maximum(errors, 1e-9), "o", color="C0", markersize=3.5)
+            said.append(np.sqrt(np.mean([row[f"{key}_deviation"] ** 2 for row in of])))
+        axis.plot(places, said, "_-", color="C1", markersize=16, label="expected by the fit")
+        axis.axhline(goal, color="grey", linestyle=":", label="goal without noise")
+        axis.set_yscale("log")
+        axis.set_xticks(places, [f"{100 * level:g} %" for level in levels])
+        axis.set_xlabel("noise, in the mean radiance")
+        axis.set_title(f"error of the {unit}")
+        axis.grid(alpha=0.3)
+    axes[0].legend(frameon=False, loc="lower right")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def draw_sky(
+    path: Path,
+    mesh: geometry.Mesh,
+    sun: Float[np.ndarray, " 3"],
+    cases: list[Case],
+    height: int,
+) -> None:
+    """Columns: noise. Rows: the mesh as observed, the dome of the sky recovered from it."""
+    camera = imaging.Camera.facing(mesh, width=height, height=height)
+    raster = imaging.rasterize(mesh, camera, samples=2)
+    first = imaging.interpolate(raster, mesh.faces, cases[0].observed)
+    exposure = float(imaging.auto_exposure(first, raster.mask))
+    figure, axes = plt.subplots(
+        2,
+        len(cases),
+        figsize=(2.5 * len(cases), 5.6),
+        layout="constrained",
+        squeeze=False,
+    )
+    for (above, below), case in zip(axes.T, cases, strict=True):
+        image = imaging.interpolate(raster, mesh.faces, case.observed, 1 / exposure)
+        above.imshow(imaging.tone_map(image, exposure))
+        above.set_title(f"noise {100 * case.noise:g} %", fontsize=10)
+        _draw_dome(below, case.found.value, sun)
+        above.axis("off")
+        below.axis("off")
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def _draw_dome(axis, value: inverse.SkyLight, sun: Float[np.ndarray, " 3"]) -> None:
+    """The hemisphere from below, zenith in the middle, equal areas; rings around both suns."""
+    x, y = np.meshgrid(*[np.linspace(-1, 1, _DOME)] * 2)
+    squared = x * x + y * y
+    inside = squared <= 1
+    # Lambert's projection: |p|² = 1 - z.
+    z = np.where(inside, 1 - squared, 0.0)
+    stretch = np.sqrt(np.maximum(1 + z, 1e-9))
+    views = jnp.asarray(np.stack([x * stretch, y * stretch, z], axis=-1))
+    seen = sky.preetham_radiance(views, value.sun, value.turbidity, check="allow")
+    level = float(jnp.mean(seen[jnp.asarray(inside)]))
+    shown = np.array(imaging.tone_map(seen, 0.6 / level, curve="reinhard", white=4.0))
+    shown[~inside] = 1
+    axis.imshow(shown, extent=(-1, 1, -1, 1), origin="lower")
+    for direction, color, size in ((sun, "k", 13), (np.asarray(value.sun), "w", 8)):
+        place = direction[:2] / np.sqrt(1 + direction[2])
+        axis.plot(*place, "o", markerfacecolor="none", markeredgecolor=color, markersize=size)
+    axis.set_title(f"turbidity {float(value.turbidity):.3f}", fontsize=10)

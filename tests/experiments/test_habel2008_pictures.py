@@ -1,0 +1,84 @@
+"""The experiments `habel2008.*` and `inverse.sky` end to end on the embedded data, small."""
+
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from experiments.__main__ import main
+from experiments._habel2008_day import sun_at_hour
+from experiments._habel2008_figure4 import measures, windowed
+from experiments._habel2008_spheres import sun_at
+from jaxsh import sky
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    def run(name, *options):
+        monkeypatch.delenv("JAXSH_DATA", raising=False)
+        out = ["--out", str(tmp_path), "--no-progress"]
+        assert main(["run", name, *out, *options]) == 0
+        folder = tmp_path / name / "quick"
+        return folder, json.loads((folder / "metrics.json").read_text())
+
+    return run
+
+
+def test_day(run):
+    options = ["--frames", "3", "--sheet", "3", "--height", "32", "--samples", "1"]
+    folder, rows = run("habel2008.figure1_5", *options, "--directions", "16", "--bands", "3")
+    morning, noon, evening = rows
+    assert morning["elevation"] == pytest.approx(evening["elevation"])
+    assert morning["sun"] < 0.05 * noon["sun"]
+    assert 20 < noon["sunlit"] < 100
+    assert (folder / "day.gif").read_bytes().startswith(b"GIF89a")
+    assert (folder / "day.png").stat().st_size > 3_000
+
+
+def test_worst_case(run):
+    options = ["--suns", "4", "--turbidities", "2", "--bands", "2", "7", "--samples", "16", "10"]
+    folder, rows = run("habel2008.figure2", *options)
+    at = {(row["model"][:11], row["bands"]): row for row in rows}
+    assert at["the shipped", 7]["error"] < 0.006 < 0.1 < at["the paper's", 7]["error"] < 1
+    assert at["the shipped", 7]["pixel"] < at["the shipped", 7]["truncation"] / 100
+    assert (folder / "figure2.png").stat().st_size > 20_000
+
+
+def test_ringing(run):
+    folder, rows = run("habel2008.figure4", "--zeniths", "60", "--shown", "0")
+    at = {row["window"]: row for row in rows}
+    # Weaker and weaker ringing, dearer and dearer.
+    assert at["none"]["rms"] > at["zonal sinc (eq. 5)"]["rms"] > at["sinc"]["rms"]
+    assert at["none"]["negative"] < at["zonal sinc (eq. 5)"]["negative"] < at["sinc"]["negative"]
+    assert at["dering"]["negative"] > -1e-3
+    assert abs(at["none"]["cost"]) < 0.1 < 0.5 < abs(at["sinc"]["cost"])
+    assert at["none"]["nonzonal"] == pytest.approx(14.2, abs=1)  # against "only zonal terms ring"
+    assert (folder / "figure4.png").stat().st_size > 20_000
+
+
+def test_eq_5_leaves_the_other_orders_alone():
+    light = sky.project_preetham(jnp.asarray(sun_at(60)), 3.0)
+    zonal = [l * (l + 1) for l in range(7)]
+    changed = np.flatnonzero(np.any(windowed(light, "zonal sinc (eq. 5)") != light, axis=0))
+    assert set(changed) == set(zonal[1:])
+    assert measures(light, light)["blur"] == 0
+
+
+def test_suns_of_the_day():
+    np.testing.assert_allclose(
+        sun_at_hour(0, 50, 0), [0, -np.sin(np.radians(50)), np.cos(np.radians(50))]
+    )
+    np.testing.assert_allclose(sun_at_hour(-6, 50, 0), [1, 0, 0], atol=1e-15)  # rises in the east
+
+
+def test_inverse_sky(run):
+    options = ["--noise", "0", "0.01", "--settings", "2", "--degree", "4", "--directions", "16"]
+    folder, rows = run("inverse.sky", *options, "--height", "32")
+    for row in rows:
+        assert row["converged"]
+        assert row["sun_error"] < 0.1
+        assert row["turbidity_error"] < 0.02
+    assert rows[0]["sun_deviation"] < rows[2]["sun_deviation"]
+    for picture in ("errors.png", "recovered.png"):
+        assert (folder / picture).stat().st_size > 5_000
