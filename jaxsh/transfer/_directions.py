@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from ..harmonics import evaluate
 from ..sphere import fibonacci
+from ._receivers import basis_at
 
 # For each ray that the user grants the sphere: directions in the quadrature, and guides. So a
 # vertex of the armadillo casts 8 % fewer rays than with an even set of the granted size, and errs
@@ -42,7 +42,7 @@ def guided(rays: int, degree: int, seed: int, dtype: np.dtype) -> Directions:
     )
     return Directions(
         vectors=vectors,
-        basis=evaluate(jnp.asarray(vectors), degree) * (4 * math.pi / count),
+        basis=jnp.asarray(basis_at(vectors, degree) * (4 * math.pi / count)),
         guides=guides,
         nearest=np.concatenate([(part @ chosen.T).argmax(axis=1) for part in _parts(vectors)]),
         around=np.ascontiguousarray(order.T),

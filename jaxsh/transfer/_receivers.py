@@ -1,16 +1,19 @@
 """What gathers light: points off the surface and their normals, with what is wrong about them."""
 
+import functools
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from ..geometry import Mesh
-from ..harmonics import clamped_cosine, convolve, evaluate
+from ..harmonics import clamped_cosine, convolve, evaluate, num_coefficients
 
 # Faces cancel where the sum of their area vectors is but the rounding of its terms.
 _CANCELLED = 8 * np.finfo(np.float32).eps
+_UP, _BLOCK = np.array([0, 0, 1]), 1024
 
 
 class Receivers(NamedTuple):
@@ -42,9 +45,23 @@ def receivers(mesh: Mesh, offset: float) -> Receivers:
 def unshadowed(normals: Float[np.ndarray, "v 3"], degree: int) -> Float[np.ndarray, "v k"]:
     """Coefficients λ_l y_lm(n) of the clamped cosine about each normal, zero about a zero one."""
     defined = normals.any(axis=1, keepdims=True)
-    up = np.array([0, 0, 1], normals.dtype)
-    basis = evaluate(jnp.asarray(np.where(defined, normals, up)), degree)
-    return np.where(defined, np.asarray(convolve(basis, clamped_cosine(degree))), 0)
+    basis = basis_at(np.where(defined, normals, _UP.astype(normals.dtype)), degree)
+    lambdas = np.asarray(_cosine_lambdas(degree), basis.dtype)
+    return np.where(defined, basis * lambdas, 0)
+
+
+def basis_at(vectors: Float[np.ndarray, "n 3"], degree: int) -> Float[np.ndarray, "n k"]:
+    """y_i at each vector, block by block: one compiled program serves any number of them."""
+    blocks = -(-len(vectors) // _BLOCK)
+    padded = np.tile(_UP.astype(vectors.dtype), (blocks * _BLOCK, 1))
+    padded[: len(vectors)] = vectors
+    basis = [evaluate(jnp.asarray(block), degree) for block in padded.reshape(blocks, _BLOCK, 3)]
+    return np.concatenate(basis)[: len(vectors)]
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _cosine_lambdas(degree: int) -> Float[Array, " k"]:
+    return convolve(jnp.ones(num_coefficients(degree)), clamped_cosine(degree))
 
 
 def unit_normals(mesh: Mesh) -> Float[np.ndarray, "v 3"]:
