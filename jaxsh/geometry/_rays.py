@@ -62,7 +62,7 @@ class RayScene:
             TriangleMesh(self._scene, vertices, np.ascontiguousarray(mesh.faces, np.int32))
         # Embree builds its tree at the first query, and that must not happen on two threads.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
-        self._threads = _cores()
+        self._threads = cores()
         self._pool = ThreadPoolExecutor(self._threads)
 
     def occluded(
@@ -123,7 +123,7 @@ class RayScene:
             list(self._pool.map(run, parts))
 
 
-def _cores() -> int:
+def cores() -> int:
     """The cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

@@ -1,7 +1,6 @@
 """Vertices block by block: on every core, with a bar that grows and a checkpoint that remembers."""
 
 import contextlib
-import os
 import sys
 from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from ..geometry._rays import cores
 from ._checkpoint import Checkpoint
 from ._gather import TILE
 
@@ -75,17 +75,10 @@ def progress_bar(total: int, shown: bool):
 
 def _in_order(gather: Gather, parts: list[slice]) -> Generator[tuple[slice, np.ndarray]]:
     """Each part with its rows. After an exception or an interrupt later parts are not begun."""
-    with ThreadPoolExecutor(_cores()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         futures = [pool.submit(gather, part) for part in parts]
         try:
             for part, future in zip(parts, futures, strict=True):
                 yield part, future.result()
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _cores() -> int:
-    """The cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -117,7 +117,7 @@ def test_chunks_and_threads_do_not_change_answers(chunk, threads):
     whole = RayScene(mesh)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_rays, "_CHUNK", (1, chunk))
-        patch.setattr(_rays, "_cores", lambda: threads)
+        patch.setattr(_rays, "cores", lambda: threads)
         cut = RayScene(mesh)
         occluded, hit = cut.occluded(origins, directions), cut.closest_hit(origins, directions)
     np.testing.assert_array_equal(occluded, whole.occluded(origins, directions))

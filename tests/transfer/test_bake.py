@@ -136,8 +136,8 @@ def test_a_seed_turns_the_directions():
 def test_chunks_and_threads_change_no_bit(monkeypatch, chunk, threads):
     mesh = knot(500)
     whole = baked(mesh, directions=256, bounces=1)
-    monkeypatch.setattr(_rays, "_cores", lambda: threads)
-    monkeypatch.setattr(_blocks, "_cores", lambda: threads)
+    monkeypatch.setattr(_rays, "cores", lambda: threads)
+    monkeypatch.setattr(_blocks, "cores", lambda: threads)
     cut = baked(mesh, directions=256, bounces=1, chunk=chunk)
     np.testing.assert_array_equal(cut, whole)
 

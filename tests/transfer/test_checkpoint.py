@@ -43,7 +43,7 @@ def whole():
 
 @pytest.mark.parametrize("share", [0.05, 0.3, 0.8, 0.97])
 def test_a_stopped_bake_goes_on_and_ends_the_same(tmp_path, monkeypatch, whole, share):
-    monkeypatch.setattr(_blocks, "_cores", lambda: 1)
+    monkeypatch.setattr(_blocks, "cores", lambda: 1)
     expected, questions = whole
     path = tmp_path / "folder" / "bake.part"
     first = Stopping(after=int(share * questions))
