@@ -164,7 +164,7 @@ def _row_by_row(row, basis: Float[Array, "k n"], *arguments):
 
     A loop, for its transpose's sake: reverse mode adds up K rows, and a loop that makes each row
     anew from the basis does so within the cache, where XLA's reduction over all of them at once
-    is 2 to 40 times slower on the CPU. Vectors come as three rows: of one array with three, the
+    is many times slower on the CPU. Vectors come as three rows: of one array with three, the
     transposed loop would copy all of it for each row that it adds to.
     """
     row = jax.checkpoint(row, prevent_cse=False)

@@ -37,8 +37,8 @@ def preetham_harmonics(
 ) -> Float[Array, "*out 3 k"]:
     """Coefficients of Preetham's sky without the sun's disc, from a stored fit: (..., 3, K).
 
-    Linear sRGB, kcd/m², the paper's constants. In a batch about a thousand times as fast as
-    `project_preetham`; for one sun, where a call costs more than its arithmetic, 20 times.
+    Linear sRGB, kcd/m², the paper's constants. Far cheaper than
+    `project_preetham`, most of all in a batch: one sun's call costs more than its arithmetic.
 
     **Arguments**
 

@@ -11,8 +11,8 @@ from ..sphere import fibonacci
 from ._receivers import basis_at
 
 # For each ray that the user grants the sphere: directions in the quadrature, and guides. So a
-# vertex of the armadillo casts 8 % fewer rays than with an even set of the granted size, and errs
-# about half as much: 0.90 % against 1.64 % at 2,048 and degree 10.
+# vertex casts about as many rays as with an even set of the granted size, and errs less: the
+# experiment `first_light` prints by how much it errs, and the rays that it takes.
 _QUADRATURE, _GUIDES, _FEWEST_GUIDES = 9 / 4, 1 / 2, 256
 _AROUND = 8
 
