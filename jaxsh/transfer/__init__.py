@@ -6,8 +6,23 @@ coefficients, for any light, and differentiates.
 
 from ._bake import bake
 from ._file import load, save
+from ._glossy import shade_glossy
+from ._light_product import LightProduct, light_product
 from ._material import Material
+from ._sampled import SampledTransfer, sample
 from ._shade import shade_diffuse
 from ._transfer import Transfer
 
-__all__ = ["Material", "Transfer", "bake", "load", "save", "shade_diffuse"]
+__all__ = [
+    "LightProduct",
+    "Material",
+    "SampledTransfer",
+    "Transfer",
+    "bake",
+    "light_product",
+    "load",
+    "sample",
+    "save",
+    "shade_diffuse",
+    "shade_glossy",
+]

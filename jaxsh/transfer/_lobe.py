@@ -1,0 +1,76 @@
+"""The glossy lobe: where it points, and what it is worth in a direction."""
+
+import functools
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from numpy.polynomial import Polynomial
+
+from ..harmonics import phong
+from ..harmonics._unit import normalize
+
+
+def reflected(
+    eye: Float[Array, " 3"],
+    positions: Float[Array, "v 3"],
+    normals: Float[Array, "v 3"],
+    distant: bool,
+) -> Float[Array, "3 v"]:
+    """B(ω_o) = 2 (n·ω_o) n - ω_o, the direction towards the eye, mirrored about the normal.
+
+    Always a unit vector: a normal that is undefined counts as zero, which turns B into -ω_o, and
+    an eye on the vertex itself is taken to be straight above it.
+    """
+    normal = _unit(normals.T)
+    there = jnp.broadcast_to(eye[:, None], normal.shape) if distant else eye[:, None] - positions.T
+    towards = _unit(jnp.where(jnp.all(there == 0, axis=0, keepdims=True), normal, there))
+    cosine = normal[0] * towards[0] + normal[1] * towards[1] + normal[2] * towards[2]
+    return (2 * cosine)[None] * normal - towards
+
+
+def lobe_polynomial(
+    exponent: Float[Array, "*v"], degree: int, normalized: bool
+) -> Float[Array, "bands ..."]:
+    """Coefficients of a Phong lobe, cut to a degree, as a polynomial of t = cos θ.
+
+    Σ_l g_l y_l0(t) = E(t² - ½) + t O(t² - ½). Those of E come first, ascending. Around the middle
+    of [0, 1] they stay small, where powers of t alone would cancel each other.
+    """
+    zonal = jnp.moveaxis(phong(exponent, degree, normalized=normalized), -1, 0)
+    return jnp.tensordot(jnp.asarray(_powers(degree), zonal.dtype), zonal, 1, precision="highest")
+
+
+def lobe(t: Float[Array, "..."], polynomial: Float[Array, "bands ..."]) -> Float[Array, "..."]:
+    """The lobe at t = cos θ from its axis. Batches of polynomials broadcast against t."""
+    even, odd = jnp.split(polynomial, [(len(polynomial) + 1) // 2])
+    u = t * t - 0.5
+
+    def horner(coefficients):
+        return functools.reduce(lambda value, c: value * u + c, reversed(coefficients))
+
+    return horner(list(even)) + (t * horner(list(odd)) if len(odd) else 0.0)
+
+
+def _unit(vectors: Float[Array, "3 v"]) -> Float[Array, "3 v"]:
+    """At unit length, or zero where there is no direction."""
+    x, y, z = vectors
+    defined = (jnp.isfinite(vectors).all(axis=0) & ((x != 0) | (y != 0) | (z != 0)))[None]
+    unit, _ = normalize(jnp.where(defined, vectors, 1.0)[:, None])
+    return jnp.where(defined, unit[:, 0], 0.0)
+
+
+@functools.lru_cache(maxsize=16)
+def _powers(degree: int) -> Float[np.ndarray, "bands bands"]:
+    """From g_l to the coefficients of E and O."""
+    # P_l(t) is p_l(u), or t p_l(u) for odd l: Bonnet's recursion with t² = u + ½.
+    polynomials = [Polynomial([1.0]), Polynomial([1.0])]
+    for l in range(1, degree):
+        p = (2 * l + 1) * polynomials[l] * Polynomial([0.5, 1] if l % 2 else [1.0])
+        polynomials.append((p - l * polynomials[l - 1]) / (l + 1))
+    matrix = np.zeros((degree + 1, degree + 1))
+    for l, p in enumerate(polynomials[: degree + 1]):
+        start = (degree // 2 + 1) * (l % 2)
+        norm = np.sqrt((2 * l + 1) / (4 * np.pi))
+        matrix[start : start + len(p.coef), l] = norm * p.coef
+    return matrix

@@ -1,0 +1,323 @@
+"""Glossy shading against a quadrature of equation 5 that knows nothing of products or nodes."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.test_util import check_grads
+
+from jaxsh import harmonics
+from jaxsh.transfer import (
+    LightProduct,
+    Material,
+    Transfer,
+    light_product,
+    sample,
+    shade_diffuse,
+    shade_glossy,
+)
+from jaxsh.transfer._lobe import lobe, lobe_polynomial
+from jaxsh.transfer._nodes import product_nodes
+
+V, DEGREE, K = 7, 3, 16
+EYE = np.array([0.3, -2.0, 1.5])
+MATERIAL = Material(0.4, 0.7, 12.0)
+
+
+def surface(rng, dtype=np.float64, count=V, degree=DEGREE):
+    normals = rng.normal(size=(count, 3))
+    return Transfer(
+        coefficients=jnp.asarray(rng.normal(size=(count, (degree + 1) ** 2)), dtype),
+        positions=jnp.asarray(rng.normal(size=(count, 3)), dtype),
+        normals=jnp.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True), dtype),
+        neighbors=jnp.zeros((count, 1), np.int32),
+    )
+
+
+def by_quadrature(light, transfer, axes, material, *, normalized=True):
+    """Equations 4 and 5, every function cut to the light's degree and summed over a fine grid.
+
+    The lobe's own harmonics, too, come from an integral over the sphere, of the power itself.
+    """
+    degree = harmonics.degree_of(light.shape[-1])
+    z, ring = np.polynomial.legendre.leggauss(24)
+    steps = 30
+    phi = 2 * np.pi * np.arange(steps) / steps
+    r = np.sqrt(1 - z**2)[:, None]
+    grid = np.stack(np.broadcast_arrays(r * np.cos(phi), r * np.sin(phi), z[:, None]), -1)
+    grid, weights = grid.reshape(-1, 3), np.repeat(ring * 2 * np.pi / steps, steps)
+    basis = np.asarray(harmonics.evaluate(grid, degree))
+    coefficients = np.asarray(transfer.coefficients)[:, : light.shape[-1]]
+    received = (light @ basis.T)[:, None] * (coefficients @ basis.T)
+    x = (np.polynomial.legendre.leggauss(400)[0] + 1) / 2
+    inner = np.polynomial.legendre.leggauss(400)[1] / 2
+    exponents = np.broadcast_to(np.asarray(material.exponent), len(axes))
+    glossy = []
+    for axis, exponent, row in zip(axes, exponents, np.moveaxis(received, 1, 0), strict=True):
+        cosine, shape = grid @ axis, 0
+        for l in range(degree + 1):
+            legendre = np.polynomial.Legendre.basis(l)
+            weight = 2 * np.pi * np.sum(inner * x**exponent * legendre(x))
+            if normalized:
+                weight *= (exponent + 1) / (2 * np.pi)
+            shape = shape + (2 * l + 1) / (4 * np.pi) * weight * legendre(cosine)
+        glossy.append(row @ (weights * shape))
+    diffuse = np.moveaxis(received @ weights, 0, -1) / np.pi
+    return np.asarray(material.diffuse) * diffuse + np.asarray(material.specular) * np.stack(glossy)
+
+
+def mirrored(eye, transfer):
+    towards = eye - np.asarray(transfer.positions)
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    normal = np.asarray(transfer.normals)
+    return 2 * np.sum(towards * normal, axis=1, keepdims=True) * normal - towards
+
+
+@pytest.mark.parametrize(("dtype", "rtol"), [(np.float32, 3e-6), (np.float64, 1e-12)])
+@pytest.mark.parametrize("normalized", [True, False])
+def test_glossy_equals_quadrature(rng, dtype, rtol, normalized):
+    made, light = surface(rng, dtype), rng.normal(size=(3, K))
+    material = Material(rng.uniform(size=3), rng.uniform(size=(V, 3)), rng.uniform(1, 60, size=V))
+    exact = by_quadrature(light, made, mirrored(EYE, made), material, normalized=normalized)
+    for transfer, given in (
+        (made, light),
+        (sample(made), light),
+        (light_product(jnp.asarray(light, dtype), made), None),
+    ):
+        got = shade_glossy(given, transfer, EYE, material, normalized=normalized)
+        assert got.dtype == dtype
+        np.testing.assert_allclose(got, exact, rtol=0, atol=rtol * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("light_degree", [0, 2])
+def test_everything_is_cut_to_the_light_s_degree(rng, light_degree):
+    made, light = surface(rng), rng.normal(size=(3, (light_degree + 1) ** 2))
+    exact = by_quadrature(light, made, mirrored(EYE, made), MATERIAL)
+    got = [
+        shade_glossy(light, made, EYE, MATERIAL),
+        shade_glossy(light, sample(made, light_degree), EYE, MATERIAL),
+        shade_glossy(None, light_product(light, made), EYE, MATERIAL),
+    ]
+    for one in got:
+        np.testing.assert_allclose(one, exact, rtol=0, atol=1e-12 * np.abs(exact).max())
+
+
+def test_glossy_is_a_product_matrix(rng):
+    """Equations 2, 3 and 6 as they are printed, with Lee and Kim's degree of 10."""
+    made = surface(rng, degree=10)
+    light = rng.normal(size=(3, 121))
+    matrix = np.asarray(harmonics.product_matrix(light))
+    alpha = np.asarray(harmonics.phong(32.0, 10, normalized=True))
+    alpha = np.repeat(alpha * np.sqrt(4 * np.pi / (2 * np.arange(11) + 1)), 2 * np.arange(11) + 1)
+    kernel = alpha * np.asarray(harmonics.evaluate(mirrored(EYE, made), 10))
+    exact = np.einsum("vi,cij,vj->vc", kernel, matrix, made.coefficients, optimize=True)
+    got = shade_glossy(light, made, EYE, Material(0.0, 1.0, 32.0))
+    np.testing.assert_allclose(got, exact, rtol=0, atol=1e-12 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("lights", [(1,), (2, V)])
+def test_lights_in_batches_and_of_their_own(rng, lights):
+    made, light = surface(rng), rng.normal(size=(*lights, 3, K))
+    each = np.broadcast_to(light, (*lights[:-1], V, 3, K)).reshape(-1, V, 3, K)
+    axes = mirrored(EYE, made)
+    exact = np.stack(
+        [
+            [
+                by_quadrature(one, eqx.tree_at(lambda t: t.coefficients, made, row), axis, MATERIAL)
+                for one, row, axis in zip(
+                    batch, made.coefficients[:, None], axes[:, None], strict=True
+                )
+            ]
+            for batch in each
+        ]
+    ).reshape(*lights[:-1], V, 3)
+    got = shade_glossy(light, made, EYE, MATERIAL)
+    np.testing.assert_allclose(got, exact, rtol=0, atol=1e-12 * np.abs(exact).max())
+
+
+def test_a_mesh_of_more_than_a_tile(rng):
+    made, light = surface(rng, count=1030, degree=1), rng.normal(size=(3, 4))
+    exact = by_quadrature(light, made, mirrored(EYE, made), MATERIAL)
+    for transfer, given in ((made, light), (light_product(light, made), None)):
+        got = shade_glossy(given, transfer, EYE, MATERIAL)
+        np.testing.assert_allclose(got, exact, rtol=0, atol=1e-12 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("exponent", [1.0, 32.0, 1000.0])
+def test_a_furnace_keeps_a_glossy_surface_s_albedo(rng, exponent):
+    """Light times transfer one everywhere: the lobe integrates to one."""
+    made = surface(rng)
+    one = np.zeros((1, K))
+    one[0, 0] = np.sqrt(4 * np.pi)
+    made = eqx.tree_at(lambda t: t.coefficients, made, jnp.repeat(jnp.asarray(one), V, axis=0))
+    light = np.repeat(one, 3, axis=0)
+    albedo = rng.uniform(size=(V, 3))
+    got = shade_glossy(light, made, EYE, Material(0.0, albedo, exponent))
+    np.testing.assert_allclose(got, albedo, rtol=1e-13)
+    bare = shade_glossy(light, made, EYE, Material(0.0, albedo, exponent), normalized=False)
+    np.testing.assert_allclose(bare, albedo * 2 * np.pi / (exponent + 1), rtol=1e-12)
+
+
+def test_without_gloss_it_is_diffuse_shading(rng):
+    made, light = surface(rng), rng.normal(size=(3, K))
+    matt = Material(rng.uniform(size=(V, 3)), 0.0, 8.0)
+    np.testing.assert_allclose(
+        shade_glossy(light, made, EYE, matt),
+        shade_diffuse(light, made, matt.diffuse),
+        rtol=1e-12,
+        atol=1e-13,
+    )
+
+
+def test_a_distant_eye_is_the_limit_of_a_far_one(rng):
+    made, light = surface(rng), rng.normal(size=(3, K))
+    distant = shade_glossy(light, made, 3 * EYE, MATERIAL, distant=True)
+    far = shade_glossy(light, made, 1e9 * EYE, MATERIAL)
+    np.testing.assert_allclose(distant, far, rtol=1e-6, atol=1e-7)
+
+
+def test_where_there_is_no_direction_the_value_is_finite(rng):
+    made, light = surface(rng), rng.normal(size=(3, K))
+    normals = made.normals.at[0].set(0).at[1].set(jnp.nan).at[2].set([0, 0, 1.0])
+    made = eqx.tree_at(lambda t: t.normals, made, normals)
+
+    def total(eye):
+        return jnp.sum(shade_glossy(light, made, eye, MATERIAL))
+
+    assert np.isfinite(jax.grad(total)(jnp.asarray(EYE))).all()
+    on_it = jnp.asarray(made.positions[2])
+    above = on_it + jnp.array([0, 0, 1e-6])
+    value, beside = (shade_glossy(light, made, eye, MATERIAL)[2] for eye in (on_it, above))
+    np.testing.assert_allclose(value, beside, rtol=1e-12)
+    behind = shade_glossy(light, made, EYE, MATERIAL)[:2]
+    turned = eqx.tree_at(lambda t: t.normals, made, normals.at[:2].set(0))
+    np.testing.assert_array_equal(behind, shade_glossy(light, turned, EYE, MATERIAL)[:2])
+
+
+@pytest.mark.parametrize("form", ["transfer", "sampled", "light product"])
+def test_glossy_derivatives(rng, form):
+    made, light = surface(rng, degree=2, count=3), jnp.asarray(rng.normal(size=(3, 9)))
+
+    def shade(light, coefficients, normals, eye, specular, exponent):
+        arrays = coefficients, made.positions, normals, made.neighbors
+        transfer = Transfer(*map(jnp.asarray, arrays))
+        if form == "sampled":
+            transfer = sample(transfer)
+        if form == "light product":
+            transfer, light = light_product(light, transfer), None
+        return shade_glossy(light, transfer, eye, Material(0.3, specular, exponent))
+
+    arguments = (
+        light,
+        made.coefficients,
+        made.normals,
+        jnp.asarray(EYE),
+        jnp.asarray(rng.uniform(size=(3, 3))),
+        jnp.asarray([3.0, 20.0, 60.0]),
+    )
+    check_grads(shade, arguments, order=1, modes=["fwd", "rev"], rtol=1e-5, atol=1e-6)
+
+
+def test_glossy_maps_over_lights_and_eyes(rng):
+    made, lights = sample(surface(rng)), jnp.asarray(rng.normal(size=(4, 3, K)))
+    batch = shade_glossy(lights[:, None], made, EYE, MATERIAL)
+
+    def shade(light, eye):
+        return shade_glossy(light, made, eye, MATERIAL)
+
+    mapped = jax.jit(jax.vmap(shade, (0, None)))(lights, jnp.asarray(EYE))
+    np.testing.assert_allclose(mapped, batch, rtol=1e-12, atol=1e-13)
+    eyes = jnp.asarray(EYE + rng.normal(size=(3, 3)))
+    mapped = jax.vmap(shade, (None, 0))(lights[0], eyes)
+    one_by_one = jnp.stack([shade(lights[0], eye) for eye in eyes])
+    np.testing.assert_allclose(mapped, one_by_one, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2, 10, 14])
+def test_nodes_integrate_products_of_three(rng, degree):
+    """Against the coefficients of the product of two, by another grid; 14 asks for order 42."""
+    nodes = product_nodes(degree)
+    f, g, h = rng.normal(size=(3, (degree + 1) ** 2))
+    weights = nodes.project[0] * np.sqrt(4 * np.pi)
+    got = np.sum(weights * np.prod([nodes.basis @ one for one in (f, g, h)], axis=0))
+    exact = harmonics.triple_integral(f, g, h)
+    np.testing.assert_allclose(got, exact, rtol=1e-11, atol=1e-11)
+    assert weights.sum() == pytest.approx(4 * np.pi)
+    np.testing.assert_allclose(
+        nodes.basis, harmonics.evaluate(nodes.directions, degree), rtol=0, atol=1e-13
+    )
+
+
+def test_beyond_lebedev_s_rules_there_is_another():
+    nodes = product_nodes(44)
+    gram = nodes.project @ nodes.basis
+    np.testing.assert_allclose(gram, np.eye(len(gram)), atol=1e-11)
+
+
+@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float32, 6e-6), (np.float64, 2e-14)])
+@pytest.mark.parametrize("degree", [0, 1, 5, 13, 20])
+def test_the_lobe_s_polynomial(dtype, tolerance, degree):
+    for exponent in (1.0, 32.0, 1000.0):
+        exponent = jnp.asarray(exponent, dtype)
+        t = np.linspace(-1, 1, 1001)
+        zonal = np.asarray(harmonics.phong(np.float64(exponent), degree))
+        norms = np.sqrt((2 * np.arange(degree + 1) + 1) / (4 * np.pi))
+        exact = np.polynomial.legendre.legval(t, zonal * norms)
+        polynomial = lobe_polynomial(exponent, degree, False)
+        got = lobe(jnp.asarray(t, dtype), polynomial[:, None])
+        np.testing.assert_allclose(
+            np.broadcast_to(got, t.shape), exact, rtol=0, atol=tolerance * np.abs(exact).max()
+        )
+
+
+def test_frames_share_one_program(rng):
+    made = sample(surface(rng))
+    traces = 0
+
+    @jax.jit
+    def frame(light, eye):
+        nonlocal traces
+        traces += 1
+        return shade_glossy(light, made, eye, MATERIAL)
+
+    for _ in range(3):
+        frame(jnp.asarray(rng.normal(size=(3, K))), jnp.asarray(rng.normal(size=3)))
+    assert traces == 1
+
+
+@pytest.mark.parametrize(
+    ("light", "eye", "material", "message"),
+    [
+        ((9,), (3,), MATERIAL, r"expected light \(3, K\), or .* got shape \(9,\)"),
+        ((5, 3, 9), (3,), MATERIAL, r"\(\.\.\., 1, 3, K\) for a batch of shared ones"),
+        ((3, 8), (3,), MATERIAL, "got 8"),
+        ((3, 25), (3,), MATERIAL, r"light's degree 4 is above the transfer's, 3; .*\.\.\., :16\]"),
+        ((3, 16), (2, 3), MATERIAL, r"expected eye \(3,\), got shape \(2, 3\)"),
+        (None, (3,), MATERIAL, "only a LightProduct holds its own"),
+        (
+            (3, 16),
+            (3,),
+            Material(np.ones((4, 3)), 0.5, 8.0),
+            "a material of 7 vertices, but its diffuse is of 4",
+        ),
+    ],
+)
+def test_bad_glossy_arguments_are_refused(unchecked, rng, light, eye, material, message):
+    light = None if light is None else np.ones(light)
+    with pytest.raises(ValueError, match=message):
+        shade_glossy(light, surface(rng), np.ones(eye), material)
+
+
+def test_other_degrees_and_second_lights_are_refused(unchecked, rng):
+    made = surface(rng)
+    with pytest.raises(ValueError, match="sampled transfer's degree, 3, got 2; sample the transf"):
+        shade_glossy(np.ones((3, 9)), sample(made), EYE, MATERIAL)
+    with pytest.raises(ValueError, match="at most the transfer's, 3, got 4"):
+        sample(made, 4)
+    with pytest.raises(ValueError, match=r"one light \(3, K\) for all vertices"):
+        light_product(np.ones((1, 3, 9)), made)
+    product = light_product(np.ones((3, 9)), made)
+    assert isinstance(product, LightProduct)
+    with pytest.raises(ValueError, match="holds its light: expected light None"):
+        shade_glossy(np.ones((3, 9)), product, EYE, MATERIAL)
