@@ -1,5 +1,6 @@
 """Ray casting: Embree, in chunks, on every core."""
 
+import functools
 import math
 import os
 from collections.abc import Callable, Sequence
@@ -63,7 +64,11 @@ class RayScene:
         # Embree builds its tree at the first query, and that must not happen on two threads.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
         self._threads = cores()
-        self._pool = ThreadPoolExecutor(self._threads)
+
+    @functools.cached_property
+    def _pool(self) -> ThreadPoolExecutor:
+        """Started by the first query of many rays: few need no threads."""
+        return ThreadPoolExecutor(self._threads)
 
     def occluded(
         self,
