@@ -1,8 +1,7 @@
 """Real spherical harmonics of vectors, and their gradient, in the layout that is fast.
 
 Two kernels: the 2(L+1) azimuth rows, then all K rows of the basis at once (see `_tables`). XLA
-would rather fuse the first into the second and compute each azimuth row K/(2L+2) times over; on
-the CPU a conditional is a boundary that it keeps.
+would rather fuse the first into the second and compute each azimuth row K/(2L+2) times over.
 
 Derivatives never go through the products. As a solid harmonic r^l y_lm has derivatives that are
 combinations of at most two solid harmonics of degree l-1, one rule written in terms of the basis
@@ -17,6 +16,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
 from ._checks import as_float
+from ._fence import fenced
 from ._indexing import check_degree, degrees
 from ._tables import azimuth_table, gradient_table, zenith_table
 from ._unit import components_first, normalize
@@ -208,12 +208,7 @@ def _azimuth(
             row = row * (alpha * (x * x) + beta * (y * y) + gamma)
         return row, z, z * z - 0.5
 
-    def apart(unit):
-        # Never true; but a branch that might be taken is a boundary that XLA does not fuse across.
-        never = jnp.any(unit[:, :, :1] > 2)
-        return jax.lax.cond(never, lambda u: jax.tree.map(jnp.zeros_like, rows(u)), rows, unit)
-
-    return jax.lax.platform_dependent(unit, cpu=apart, default=rows)
+    return fenced(rows, unit)
 
 
 def _take(rows: Float[Array, "k n"], index: Array | np.ndarray) -> Float[Array, "... n"]:

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..harmonics import degree_of
+from ..harmonics._fence import fenced
 from ._lobe import lobe
 from ._nodes import product_nodes
 from ._sampled import SampledTransfer, in_tiles, out_of_tiles, rows_in_tiles
@@ -30,7 +31,7 @@ def lobe_products(
     def tile(part):
         transfer_part, axis, lobes = part
         samples = transfer_part if sampled else _matmul(basis, transfer_part.T)
-        return _matmul(weights, apart(lobed, axis, samples, lobes)), _matmul(weights, samples)
+        return _matmul(weights, fenced(lobed, axis, samples, lobes)), _matmul(weights, samples)
 
     sampled = isinstance(transfer, SampledTransfer)
     parts = transfer.samples if sampled else rows_in_tiles(transfer.coefficients[:, : len(project)])
@@ -42,21 +43,6 @@ def lobe_products(
         tiles = jax.lax.map(tile, (parts, axes, in_tiles(lobes[:, None])))
     glossy, irradiance = tiles
     return out_of_tiles(glossy, axis.shape[-1]), out_of_tiles(irradiance, axis.shape[-1])
-
-
-def apart(function, axis, *arguments):
-    """`function` in a kernel of its own, for which XLA must copy its tile into cache first.
-
-    Never true; but a branch that might be taken is a boundary that it does not fuse across.
-    """
-
-    def branch(axis, *arguments):
-        def zeros(*operands):
-            return jax.tree.map(jnp.zeros_like, function(*operands))
-
-        return jax.lax.cond(axis[0, 0] > 2, zeros, function, axis, *arguments)
-
-    return jax.lax.platform_dependent(axis, *arguments, cpu=branch, default=function)
 
 
 def _matmul(a, b):

@@ -1,5 +1,7 @@
 """Glossy shading against a quadrature of equation 5 that knows nothing of products or nodes."""
 
+import functools
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -21,6 +23,7 @@ from jaxsh.transfer._lobe import lobe, lobe_polynomial
 from jaxsh.transfer._nodes import product_nodes
 
 V, DEGREE, K = 7, 3, 16
+leggauss = functools.lru_cache(np.polynomial.legendre.leggauss)
 EYE = np.array([0.3, -2.0, 1.5])
 MATERIAL = Material(0.4, 0.7, 12.0)
 
@@ -41,7 +44,7 @@ def by_quadrature(light, transfer, axes, material, *, normalized=True):
     The lobe's own harmonics, too, come from an integral over the sphere, of the power itself.
     """
     degree = harmonics.degree_of(light.shape[-1])
-    z, ring = np.polynomial.legendre.leggauss(24)
+    z, ring = leggauss(24)
     steps = 30
     phi = 2 * np.pi * np.arange(steps) / steps
     r = np.sqrt(1 - z**2)[:, None]
@@ -50,8 +53,8 @@ def by_quadrature(light, transfer, axes, material, *, normalized=True):
     basis = np.asarray(harmonics.evaluate(grid, degree))
     coefficients = np.asarray(transfer.coefficients)[:, : light.shape[-1]]
     received = (light @ basis.T)[:, None] * (coefficients @ basis.T)
-    x = (np.polynomial.legendre.leggauss(400)[0] + 1) / 2
-    inner = np.polynomial.legendre.leggauss(400)[1] / 2
+    x, inner = leggauss(400)
+    x, inner = (x + 1) / 2, inner / 2
     exponents = np.broadcast_to(np.asarray(material.exponent), len(axes))
     glossy = []
     for axis, exponent, row in zip(axes, exponents, np.moveaxis(received, 1, 0), strict=True):
@@ -74,8 +77,9 @@ def mirrored(eye, transfer):
     return 2 * np.sum(towards * normal, axis=1, keepdims=True) * normal - towards
 
 
-@pytest.mark.parametrize(("dtype", "rtol"), [(np.float32, 3e-6), (np.float64, 1e-12)])
-@pytest.mark.parametrize("normalized", [True, False])
+@pytest.mark.parametrize(
+    ("dtype", "rtol", "normalized"), [(np.float32, 3e-6, True), (np.float64, 1e-12, False)]
+)
 def test_glossy_equals_quadrature(rng, dtype, rtol, normalized):
     made, light = surface(rng, dtype), rng.normal(size=(3, K))
     material = Material(rng.uniform(size=3), rng.uniform(size=(V, 3)), rng.uniform(1, 60, size=V))
@@ -144,19 +148,18 @@ def test_a_mesh_of_more_than_a_tile(rng):
         np.testing.assert_allclose(got, exact, rtol=0, atol=1e-12 * np.abs(exact).max())
 
 
-@pytest.mark.parametrize("exponent", [1.0, 32.0, 1000.0])
-def test_a_furnace_keeps_a_glossy_surface_s_albedo(rng, exponent):
+def test_a_furnace_keeps_a_glossy_surface_s_albedo(rng):
     """Light times transfer one everywhere: the lobe integrates to one."""
     made = surface(rng)
     one = np.zeros((1, K))
     one[0, 0] = np.sqrt(4 * np.pi)
     made = eqx.tree_at(lambda t: t.coefficients, made, jnp.repeat(jnp.asarray(one), V, axis=0))
     light = np.repeat(one, 3, axis=0)
-    albedo = rng.uniform(size=(V, 3))
+    albedo, exponent = rng.uniform(size=(V, 3)), np.geomspace(1, 1000, V)
     got = shade_glossy(light, made, EYE, Material(0.0, albedo, exponent))
     np.testing.assert_allclose(got, albedo, rtol=1e-13)
     bare = shade_glossy(light, made, EYE, Material(0.0, albedo, exponent), normalized=False)
-    np.testing.assert_allclose(bare, albedo * 2 * np.pi / (exponent + 1), rtol=1e-12)
+    np.testing.assert_allclose(bare, albedo * 2 * np.pi / (exponent[:, None] + 1), rtol=1e-12)
 
 
 def test_without_gloss_it_is_diffuse_shading(rng):
@@ -256,19 +259,16 @@ def test_beyond_lebedev_s_rules_there_is_another():
 
 
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float32, 6e-6), (np.float64, 2e-14)])
-@pytest.mark.parametrize("degree", [0, 1, 5, 13, 20])
+@pytest.mark.parametrize("degree", [0, 1, 5, 20])
 def test_the_lobe_s_polynomial(dtype, tolerance, degree):
-    for exponent in (1.0, 32.0, 1000.0):
-        exponent = jnp.asarray(exponent, dtype)
-        t = np.linspace(-1, 1, 1001)
-        zonal = np.asarray(harmonics.phong(np.float64(exponent), degree))
-        norms = np.sqrt((2 * np.arange(degree + 1) + 1) / (4 * np.pi))
-        exact = np.polynomial.legendre.legval(t, zonal * norms)
-        polynomial = lobe_polynomial(exponent, degree, False)
-        got = lobe(jnp.asarray(t, dtype), polynomial[:, None])
-        np.testing.assert_allclose(
-            np.broadcast_to(got, t.shape), exact, rtol=0, atol=tolerance * np.abs(exact).max()
-        )
+    exponents, t = np.array([1.0, 32.0, 1000.0]), np.linspace(-1, 1, 1001)
+    norms = np.sqrt((2 * np.arange(degree + 1) + 1) / (4 * np.pi))
+    zonal = np.asarray(harmonics.phong(exponents, degree)) * norms
+    exact = np.polynomial.legendre.legval(t, zonal.T)
+    polynomial = lobe_polynomial(jnp.asarray(exponents, dtype), degree, False)
+    got = lobe(jnp.asarray(t, dtype)[None], polynomial[..., None])
+    for one, own in zip(np.broadcast_to(got, exact.shape), exact, strict=True):
+        np.testing.assert_allclose(one, own, rtol=0, atol=tolerance * np.abs(own).max())
 
 
 def test_frames_share_one_program(rng):
