@@ -1,0 +1,66 @@
+"""Annen, Kautz, Durand and Seidel 2004: light from near emitters, and its gradient.
+
+A `Scene` of emitters and blockers is captured as a radiance cube at one or a few points and
+projected with its derivatives; extrapolation and interpolation carry that to every vertex. Beside
+it stand exact lights, polygons and spheres, that need no cube.
+"""
+
+from ._analytic import capture_analytic
+from ._capture import capture
+from ._cube import RadianceCube
+from ._emissive import EmissiveMesh
+from ._expansion import Expansion, extrapolate, make_expansion, monomials
+from ._grid import Grid, grid_around
+from ._interpolate import interpolate
+from ._placement import place_samples
+from ._polygon import Polygon
+from ._polygon_harmonics import polygon_harmonics, polygon_harmonics_with_gradient
+from ._project_cube import project_cube_with_gradient
+from ._scene import Scene
+from ._shade import shade
+from ._sphere import Sphere
+from ._sphere_harmonics import sphere_harmonics, sphere_harmonics_with_gradient
+from ._surface import (
+    SurfaceSamples,
+    project_surface,
+    project_surface_with_gradient,
+    surface_samples,
+)
+from ._taylor import project_cube, taylor
+from ._update import Update, update_samples
+from ._weights import Weights, inverse_distance_weights, moving_least_squares_weights
+
+__all__ = [
+    "EmissiveMesh",
+    "Expansion",
+    "Grid",
+    "Polygon",
+    "RadianceCube",
+    "Scene",
+    "Sphere",
+    "SurfaceSamples",
+    "Update",
+    "Weights",
+    "capture",
+    "capture_analytic",
+    "extrapolate",
+    "grid_around",
+    "interpolate",
+    "inverse_distance_weights",
+    "make_expansion",
+    "monomials",
+    "moving_least_squares_weights",
+    "place_samples",
+    "polygon_harmonics",
+    "polygon_harmonics_with_gradient",
+    "project_cube",
+    "project_cube_with_gradient",
+    "project_surface",
+    "project_surface_with_gradient",
+    "shade",
+    "sphere_harmonics",
+    "sphere_harmonics_with_gradient",
+    "surface_samples",
+    "taylor",
+    "update_samples",
+]

@@ -1,0 +1,140 @@
+"""Light near a point: its coefficients and their derivatives there."""
+
+import itertools
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+from ..harmonics import degree_of
+from ..harmonics._checks import align, as_float
+
+_ORDERS = {1: 0, 4: 1, 10: 2, 20: 3}  # by the number of monomials up to that order
+
+
+class Expansion(eqx.Module):
+    """The Taylor expansion of a light's coefficients around a point, channel by channel.
+
+    `terms` (..., 3, K, M) multiply the M monomials of the offset d = x - point: M = 1 (constant),
+    4 (1, dx, dy, dz), 10 (and xx, xy, xz, yy, yz, zz) or 20 (and xxx, xxy, xxz, xyy, xyz, xzz,
+    yyy, yyz, yzz, zzz). Factorials are in the terms: c(point + d) = terms . monomials(d). Leading
+    axes, if any, count points.
+
+    Raises `ValueError` for shapes that do not fit.
+    """
+
+    point: Float[Array, "*batch 3"] = eqx.field(converter=as_float)
+    terms: Float[Array, "*batch 3 k m"] = eqx.field(converter=as_float)
+
+    def __check_init__(self):
+        point, terms = self.point.shape, self.terms.shape
+        if len(terms) < 3 or terms[-3] != 3 or terms[-1] not in _ORDERS:
+            raise ValueError(f"expected terms (..., 3, K, 1, 4, 10 or 20), got shape {terms}")
+        if point != (*terms[:-3], 3):
+            raise ValueError(f"expected point {(*terms[:-3], 3)} for terms {terms}, got {point}")
+        degree_of(terms[-2])
+
+    @property
+    def order(self) -> int:
+        """The largest power of the offset: 0 to 3."""
+        return _ORDERS[self.terms.shape[-1]]
+
+    @property
+    def degree(self) -> int:
+        """The largest l of the harmonics."""
+        return degree_of(self.terms.shape[-2])
+
+    @property
+    def coefficients(self) -> Float[Array, "*batch 3 k"]:
+        """At the point itself."""
+        return self.terms[..., 0]
+
+    @property
+    def gradient(self) -> Float[Array, "*batch 3 k 3"]:
+        """With respect to the receiver's position, at the point itself.
+
+        Raises `ValueError` where the expansion is of order 0.
+        """
+        if self.order == 0:
+            raise ValueError("an expansion of order 0 has no gradient")
+        return self.terms[..., 1:4]
+
+
+def make_expansion(
+    point: Float[ArrayLike, "*batch 3"],
+    coefficients: Float[ArrayLike, "*batch 3 k"],
+    gradient: Float[ArrayLike, "*batch 3 k 3"] | None = None,
+) -> Expansion:
+    """The expansion of order 1 with these coefficients and gradient; of order 0 without one."""
+    coefficients = as_float(coefficients)[..., None]
+    if gradient is None:
+        return Expansion(point, coefficients)
+    gradient = as_float(gradient)
+    if gradient.shape != (*coefficients.shape[:-1], 3):
+        raise ValueError(
+            f"expected gradient {(*coefficients.shape[:-1], 3)} for coefficients "
+            f"{coefficients.shape[:-1]}, got shape {gradient.shape}"
+        )
+    return Expansion(point, jnp.concatenate([coefficients, gradient], axis=-1))
+
+
+def monomials(offsets: Float[Array, "*batch 3"], order: int) -> Float[Array, "*batch m"]:
+    """1, x, y, z, xx, xy, ... up to the order, in the order of `Expansion.terms`."""
+    x, y, z = offsets[..., 0], offsets[..., 1], offsets[..., 2]
+    return jnp.stack(monomial_list((x, y, z), order), axis=-1)
+
+
+def monomial_list(offset: tuple[Array, Array, Array], order: int) -> list[Array]:
+    """The monomials one by one, each made from one of the order below and one component."""
+    made: dict[tuple[int, ...], Array] = {(): jnp.ones_like(offset[0])}
+    for size in range(1, order + 1):
+        for axes in itertools.combinations_with_replacement(range(3), size):
+            made[axes] = made[axes[:-1]] * offset[axes[-1]] if size > 1 else offset[axes[0]]
+    return list(made.values())
+
+
+def term_orders(order: int) -> list[int]:
+    """The order of each monomial: 0, 1, 1, 1, 2, ..."""
+    return [size for size in range(order + 1) for _ in range(math.comb(size + 2, 2))]
+
+
+def extrapolate(
+    expansion: Expansion, positions: Float[ArrayLike, "*batch 3"]
+) -> Float[Array, "*lights 3 k"]:
+    """The light's coefficients at the positions, from its Taylor expansion (eq. 14).
+
+    Equation 14 is the expansion of order 1; the other orders, 0 to 3, go the same way.
+
+    **Arguments**
+
+    - `expansion`: around one point, or around many, whose axes broadcast with those of
+      `positions` (for all pairs: points (S,), positions (V, 1, 3)).
+    - `positions`: (..., 3), in the space of the expansion's point.
+
+    **Returns** (..., 3, K) in the dtype of the expansion. Linear in the terms, polynomial in
+    positions and point, and differentiable in all, forward and reverse. How far it may be trusted
+    is for the caller to know: the error grows as the next power of offset / distance to the light.
+
+    Raises `ValueError` for shapes that do not fit.
+    """
+    return _extrapolate(expansion, check_positions(positions).astype(expansion.terms.dtype))
+
+
+@jax.jit
+def _extrapolate(expansion: Expansion, positions: Float[Array, "*batch 3"]) -> Array:
+    point, terms = expansion.point.astype(positions.dtype), expansion.terms
+    powers = monomials(jnp.subtract(*align(positions, point)), expansion.order)
+    if point.ndim == 1:
+        return jnp.einsum("...m,ckm->...ck", powers, terms, precision="highest")
+    powers, terms = align(powers[..., None, None, :], terms)
+    return jnp.sum(powers * terms, axis=-1)
+
+
+def check_positions(positions: Float[ArrayLike, "*batch 3"]) -> Float[Array, "*batch 3"]:
+    """As a floating-point array; raises `ValueError` unless the last axis is x, y, z."""
+    positions = as_float(positions)
+    if positions.shape[-1:] != (3,):
+        raise ValueError(f"expected positions (..., 3), got shape {positions.shape}")
+    return positions

@@ -1,0 +1,69 @@
+"""Light at many positions, from the expansions around a few samples."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+from ._blend import Rule, check_weights, over_samples, rule_terms, take_rows
+from ._expansion import Expansion, check_positions, monomials
+from ._weights import Weights
+
+
+def interpolate(
+    expansions: Expansion,
+    weights: Weights,
+    positions: Float[ArrayLike, "v 3"],
+    *,
+    rule: Rule = "full",
+) -> Float[Array, "v 3 k"]:
+    """The light's coefficients at V positions: the weighted mean of what the samples say there.
+
+    **Arguments**
+
+    - `expansions`: of S samples, of any order.
+    - `weights`: of the samples at the positions: `inverse_distance_weights` (eq. 16),
+      `moving_least_squares_weights` or `Grid.weights`.
+    - `rule`: what each sample says about a position at offset d.
+      "none": its coefficients, as Sloan et al. 2002 interpolate.
+      "full": its Taylor polynomial (eq. 15 at order 1), exact for what has no higher order.
+      "half": its Taylor polynomial of order k with the terms of order q times 1 - q/(k+1). At
+      order 1 that is half the gradient. With weights of linear precision, Σ w_j = 1 and
+      Σ w_j d_j = 0, it is exact one order above "full", for k ≥ 1; with eq. 16, which has no
+      such precision, it is worse. Not in the paper; `docs/near_light_samples.md` derives it.
+
+    **Returns** (V, 3, K) in the dtype of the expansions. Linear in the terms and in the weights,
+    differentiable in all, forward and reverse. To shade with it, `shade` does both at once.
+
+    Raises `ValueError` for shapes that do not fit and an unknown rule.
+    """
+    positions = check_positions(positions).astype(expansions.terms.dtype)
+    if positions.ndim != 2:
+        raise ValueError(f"expected positions (V, 3), got shape {positions.shape}")
+    check_weights(expansions, weights, len(positions))
+    return _interpolate(expansions, weights, positions, rule)
+
+
+@functools.partial(jax.jit, static_argnums=3)
+def _interpolate(expansions, weights, positions, rule):
+    terms, order = rule_terms(expansions, rule), 0 if rule == "none" else expansions.order
+    points, values = expansions.point.astype(terms.dtype), weights.values.astype(terms.dtype)
+    cells, shape = weights.cells, (len(positions), *terms.shape[1:3])
+    if cells is not None:
+        positions, values = take_rows(positions, cells.rows), take_rows(values, cells.rows)
+        samples = cells.samples[cells.cell[cells.rows[:, 0]]]
+        points, terms = points[samples], terms[samples]
+
+    def add(total, values, points, terms):
+        offsets = positions[..., :, None, :] - points[..., None, :, :]
+        factors = values[..., None] * monomials(offsets, order)
+        factors = factors.reshape(*factors.shape[:-2], -1)
+        rows = jnp.moveaxis(terms, -1, -3).reshape(*terms.shape[:-4], factors.shape[-1], -1)
+        return total + jnp.matmul(factors, rows, precision="highest")
+
+    start = jnp.zeros((*positions.shape[:-1], shape[1] * shape[2]), terms.dtype)
+    light = over_samples(add, start, values, points, terms)
+    if cells is not None:
+        light = light.reshape(-1, light.shape[-1])[cells.place]
+    return light.reshape(shape)

@@ -1,0 +1,98 @@
+"""A flat light."""
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..harmonics._checks import as_float, is_concrete
+
+# A vertex may be this far out of the plane, as a share of the polygon's extent.
+_FLAT = {np.dtype(np.float64): 1e-9, np.dtype(np.float32): 1e-5}
+
+
+class Polygon(eqx.Module):
+    """A flat, simple polygon of n >= 3 vertices that emits `radiance` from one side, or from both.
+
+    The vertices (n, 3) run counter-clockwise seen from the side that emits; the polygon may be
+    concave. `radiance` is linear RGB (3,), the same at every point and in every direction. As a
+    blocker only the shape counts.
+
+    Raises `ValueError` for shapes that do not fit and, where values are known, for numbers that
+    are not finite, no area, vertices out of the plane (by more than 1e-9 of the extent, 1e-5
+    below float64), and a boundary that meets itself.
+    """
+
+    vertices: Float[Array, "n 3"] = eqx.field(converter=as_float)
+    radiance: Float[Array, " 3"] = eqx.field(converter=as_float)
+    two_sided: bool = eqx.field(static=True, default=False)
+
+    def __check_init__(self):
+        shape = self.vertices.shape
+        if len(shape) != 2 or shape[0] < 3 or shape[1] != 3:
+            raise ValueError(f"expected at least 3 vertices (n, 3), got shape {shape}")
+        if self.radiance.shape != (3,):
+            raise ValueError(f"expected radiance (3,), got shape {self.radiance.shape}")
+        if is_concrete(self.radiance) and not np.isfinite(self.radiance).all():
+            raise ValueError(f"a polygon's radiance must be finite, got {self.radiance}")
+        if is_concrete(self.vertices):
+            _check_vertices(np.asarray(self.vertices))
+
+
+def is_convex(vertices: Float[np.ndarray, "n 3"]) -> bool:
+    """Whether no corner of a simple polygon turns inwards."""
+    edges = np.roll(vertices, -1, axis=0) - vertices
+    turns = np.cross(edges, np.roll(edges, -1, axis=0)) @ area_vector(vertices)
+    return bool((turns >= 0).all())
+
+
+def area_vector(vertices: np.ndarray) -> np.ndarray:
+    """The vector of the area, by Newell's formula."""
+    spokes = vertices - vertices[0]
+    return np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0) / 2
+
+
+def _check_vertices(vertices: np.ndarray) -> None:
+    if not np.isfinite(vertices).all():
+        raise ValueError("a polygon's vertices must be finite")
+    tolerance = _FLAT.get(vertices.dtype, _FLAT[np.dtype(np.float32)])
+    corners = vertices.astype(np.float64)
+    corners = corners - corners[0]
+    extent = np.abs(corners).max()
+    area = area_vector(corners)
+    size = np.linalg.norm(area)
+    if size <= tolerance * extent**2:
+        raise ValueError(
+            f"a polygon must have an area, got {size:.1e} at an extent of {extent:.1e}"
+        )
+    height = np.abs(corners @ area / size).max()
+    if height > tolerance * extent:
+        raise ValueError(
+            f"a polygon must be flat: a vertex is {height / extent:.1e} of the extent out of the "
+            f"plane, more than {tolerance:.0e}; split it into triangles"
+        )
+    pair = _meeting_edges(np.delete(corners, np.argmax(np.abs(area)), axis=1))
+    if pair is not None:
+        raise ValueError(f"a polygon's boundary must not meet itself: edges {pair} do")
+
+
+def _meeting_edges(corners: Float[np.ndarray, "n 2"]) -> tuple[int, int] | None:
+    """Two edges, not neighbours, that have a point in common, if there are any.
+
+    So do edges of no length, with those beyond them; neighbours that fold back are found as the
+    edges before or after them, or as no area.
+    """
+    ends = np.roll(corners, -1, axis=0)
+
+    def side(a, b, c):  # of c from the line a -> b
+        u, v = b - a, c - a
+        return np.sign(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
+
+    a, b = corners[:, None], ends[:, None]
+    c, d = corners[None], ends[None]
+    across = (side(a, b, c) * side(a, b, d) <= 0) & (side(c, d, a) * side(c, d, b) <= 0)
+    # Edges on one line have all four sides zero, and meet where their boxes do.
+    boxes = (np.minimum(a, b) <= np.maximum(c, d)) & (np.minimum(c, d) <= np.maximum(a, b))
+    gap = (np.arange(len(corners))[:, None] - np.arange(len(corners))[None]) % len(corners)
+    apart = (gap > 1) & (gap < len(corners) - 1)
+    found = np.argwhere(across & boxes.all(axis=-1) & apart)
+    return (int(found[0, 0]), int(found[0, 1])) if len(found) else None

@@ -1,0 +1,137 @@
+"""Coefficients of the light of a polygon, exact, and their gradient."""
+
+import functools
+import math
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ..harmonics._checks import align, as_float, check_batches, is_concrete
+from ..harmonics._indexing import check_degree
+from ._polygon import Polygon, is_convex
+from ._visible import Plan, Scene, seen
+
+# Receivers per block: the basis of an arc's nodes stays in cache.
+_BLOCK = 1024
+
+
+def polygon_harmonics(
+    polygon: Polygon,
+    point: Float[ArrayLike, "*batch 3"],
+    degree: int,
+    *,
+    horizon: Float[ArrayLike, "*normals 3"] | None = None,
+    blockers: Sequence[Polygon] = (),
+) -> Float[Array, "*out 3 k"]:
+    """Coefficients ∫ L y_i dω of the light that reaches a point from a polygon, without error.
+
+    The integral over the polygon becomes one over the great-circle arcs of its boundary, exact
+    for every degree and for arcs of every length (docs/near_light_polygons.md). Exact for what
+    Annen et al. 2004 sample in eq. 5; the boundary form is not theirs.
+
+    **Arguments**
+
+    - `polygon`: concave or convex. From behind a one-sided polygon there is no light.
+    - `point`: (..., 3), the receivers. Pass all of them rather than use `jax.vmap`.
+    - `degree`: the largest l, known at trace time.
+    - `horizon`: unit normals (..., 3) of the receivers: only the part of the polygon above the
+      plane through the point counts.
+    - `blockers`: convex polygons, opaque from both sides, whose shadow is taken away. Only what
+      lies in front of the polygon's plane casts one. Any number may overlap: the union counts
+      once, by inclusion and exclusion, at a cost that doubles with each.
+
+    **Returns** (..., 3, K) in the dtype of `point`, for which vertices and radiance are cast; the
+    batches of `point` and `horizon` broadcast. Relative rounding error about ε/angle where the
+    polygon is seen under a small angle (in radians).
+
+    Differentiable in vertices, radiance, point, horizon and blockers, forward and reverse. Zero
+    with zero slope at points in the polygon's plane. At a point on an edge or vertex it is finite,
+    but the light has no limit there; the slope grows as 1/distance towards it.
+
+    Raises `ValueError` for shapes that do not fit and, where values are known, for blockers that
+    are not convex.
+    """
+    return _light(polygon, point, degree, horizon, blockers, False)[0]
+
+
+def polygon_harmonics_with_gradient(
+    polygon: Polygon,
+    point: Float[ArrayLike, "*batch 3"],
+    degree: int,
+    *,
+    horizon: Float[ArrayLike, "*normals 3"] | None = None,
+    blockers: Sequence[Polygon] = (),
+) -> tuple[Float[Array, "*out 3 k"], Float[Array, "*out 3 k 3"]]:
+    """Coefficients as `polygon_harmonics` has them, and their gradient d/d point, together.
+
+    ∇c_i = -L Σ ∫ y_i m (1/r) dt over the boundary of what is seen, where r is the distance of the
+    edge that bounds it, the polygon's or a blocker's; so, unlike eq. 8 of Annen et al. 2004, it
+    has the motion of shadows in it. `horizon` is held fixed while the point moves.
+
+    **Returns** (..., 3, K) and (..., 3, K, 3). All else as for `polygon_harmonics`.
+    """
+    return _light(polygon, point, degree, horizon, blockers, True)
+
+
+def _light(polygon, point, degree, horizon, blockers, gradient: bool):
+    point = as_float(point)
+    normals = jnp.zeros(3, point.dtype) if horizon is None else as_float(horizon)
+    for name, array in (("point", point), ("horizon", normals)):
+        if array.ndim == 0 or array.shape[-1] != 3:
+            raise ValueError(f"expected {name} (..., 3), got shape {array.shape}")
+    check_batches(point=point.shape, horizon=normals.shape)
+    for blocker in blockers:
+        if is_concrete(blocker.vertices) and not is_convex(np.asarray(blocker.vertices)):
+            raise ValueError("a blocker must be convex, got a concave one: split it")
+    clipped = horizon is not None or len(blockers) > 0
+    convex = is_concrete(polygon.vertices) and is_convex(np.asarray(polygon.vertices))
+    dtype = point.dtype
+    scene = Scene(
+        polygon.vertices.astype(dtype),
+        tuple(blocker.vertices.astype(dtype) for blocker in blockers),
+    )
+    plan = Plan(
+        check_degree(degree),
+        gradient,
+        polygon.two_sided,
+        horizon=horizon is not None,
+        triangles=clipped and not convex,
+    )
+    return _compiled(scene, point, normals.astype(dtype), polygon.radiance.astype(dtype), plan)
+
+
+@functools.partial(jax.jit, static_argnums=4)
+def _compiled(scene: Scene, point, normals, radiance, plan: Plan):
+    batch = np.broadcast_shapes(point.shape[:-1], normals.shape[:-1])
+    rows = [
+        jnp.broadcast_to(align(a, jnp.zeros((*batch, 1)))[0], (*batch, a.shape[-1])).reshape(
+            math.prod(batch), a.shape[-1]
+        )
+        for a in (point, normals)
+    ]
+    lights = _unit_lights(scene, rows[0], rows[1], plan)
+    values = []
+    for light in lights:  # (N, K), and (N, K, 3)
+        light = light.reshape(*batch, 1, *light.shape[1:])
+        color = radiance.reshape(3, *(1,) * (len(light.shape) - len(batch) - 1))
+        values.append(jnp.multiply(*align(color, light)))
+    return tuple(values)
+
+
+def _unit_lights(scene: Scene, points, normals, plan: Plan):
+    """(N, K), and (N, K, 3) with the gradient, of radiance 1 at N points, block by block."""
+    count = len(points)
+    size = max(1, min(_BLOCK, count))
+    both = jnp.concatenate([points, normals], axis=1)
+    filled = jnp.pad(both, ((0, -count % size), (0, 0)), mode="edge" if count else "constant")
+
+    @jax.checkpoint
+    def block(rows):
+        lights = seen(scene, rows[:, :3].T, rows[:, 3:].T, plan)
+        return tuple(jnp.moveaxis(light, (-1, -2), (0, 1)) for light in lights)
+
+    lights = jax.lax.map(block, filled.reshape(len(filled) // size, size, both.shape[1]))
+    return tuple(light.reshape(len(filled), *light.shape[2:])[:count] for light in lights)
