@@ -12,15 +12,27 @@ import importlib as _importlib
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 if _TYPE_CHECKING:
+    from . import adaptive as adaptive
     from . import geometry as geometry
     from . import harmonics as harmonics
     from . import imaging as imaging
     from . import inverse as inverse
+    from . import midrange as midrange
     from . import sky as sky
     from . import sphere as sphere
     from . import transfer as transfer
 
-__all__ = ["geometry", "harmonics", "imaging", "inverse", "sky", "sphere", "transfer"]
+__all__ = [
+    "adaptive",
+    "geometry",
+    "harmonics",
+    "imaging",
+    "inverse",
+    "midrange",
+    "sky",
+    "sphere",
+    "transfer",
+]
 __version__ = "0.1.0"
 
 

@@ -1,0 +1,110 @@
+"""The glossy part in full at probes, carried over where it is smooth, and in full elsewhere."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import ArrayLike, Float
+
+from ..harmonics import degree_of
+from ..harmonics._checks import align
+from ..transfer import Material, Transfer, shade_diffuse
+from ..transfer._lobe import lobe_polynomial, reflected
+from ..transfer._lobe_products import lobe_products
+from ._compact import compacted, everywhere
+from ._costs import product_cost, sum_cost
+from ._options import checked_frame, checked_scalar
+from ._probe_sets import NEAREST, ProbeSet
+from ._result import AdaptiveResult
+from ._staged import row_products
+
+
+def shade_probes(
+    light: Float[ArrayLike, "3 k"],
+    transfer: Transfer,
+    eye: Float[ArrayLike, " 3"],
+    material: Material,
+    probes: ProbeSet,
+    *,
+    threshold: Float[ArrayLike, ""] = 0.06,
+    exposure: Float[ArrayLike, ""] = 1.0,
+    distant: bool = False,
+    normalized: bool = True,
+) -> AdaptiveResult:
+    """What `transfer.shade_glossy` gives, in full only at probes and where these disagree.
+
+    All vertices take the glossy part S at the probes' base degree. The rest, ΔS, is computed at
+    the probes; a vertex takes the mean of its nearest four, weighed by 1/distance², where they
+    differ by less than `threshold`, and is computed in full where they do not. Not in Lee & Kim
+    2014, whose filter decides by ΔS itself. Whether it pays against `shade_glossy` of a sampled
+    transfer hangs on how many that are; experiment `leekim2014.table1` prints both.
+
+    **Arguments**
+
+    - `light`, `eye`, `material`, `distant`, `normalized`: as for `shade_glossy`; one light (3, K)
+      of the transfer's degree, and one exponent.
+    - `probes`: from `make_probes`, of this transfer. Serve any light and eye.
+    - `threshold`: of max - min over the four probes, the largest channel, after the albedo and
+      times `exposure`. At 0 every vertex is computed in full, exactly.
+
+    **Returns** an `AdaptiveResult`; `kept` has "probes" and "specular", the shares computed in
+    full as a probe and as a vertex. Differentiable in light and albedos where the choice of
+    vertices does not change, forward and reverse; the choice is a constant.
+
+    Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
+    """
+    light, transfer, eye, material = checked_frame(light, transfer, eye, material)
+    count = len(transfer.positions)
+    if len(probes.nearest) != count or probes.degree != transfer.degree:
+        raise ValueError(
+            f"expected probes of {count} vertices and degree {transfer.degree}, got "
+            f"{len(probes.nearest)} and {probes.degree}"
+        )
+    if degree_of(light.shape[-1]) != probes.degree:
+        raise ValueError(
+            f"expected a light of the probes' degree, {probes.degree}, got "
+            f"{degree_of(light.shape[-1])}"
+        )
+    if material.exponent.ndim:
+        raise ValueError(f"expected one exponent, got one for each of {count} vertices")
+    limits = (
+        checked_scalar("threshold", threshold, light.dtype),
+        checked_scalar("exposure", exposure, light.dtype),
+    )
+    return _shade_probes(light, transfer, eye, material, probes, limits, distant, normalized)
+
+
+@functools.partial(jax.jit, static_argnames=("distant", "normalized"))
+def _shade_probes(light, transfer, eye, material, probes, limits, distant, normalized):
+    threshold, exposure = limits
+    axis = reflected(eye, transfer.positions, transfer.normals, distant)
+    polynomial = lobe_polynomial(material.exponent, probes.degree, normalized)
+
+    def in_full(vertices):
+        return row_products(light, probes.samples, axis, polynomial, vertices)
+
+    base_polynomial = lobe_polynomial(material.exponent, probes.base.degree, normalized)
+    width = (probes.base.degree + 1) ** 2
+    base, _ = lobe_products(light[:, :width], probes.base, axis, base_polynomial)
+    at_probes = everywhere(lambda i: in_full(probes.probes[i]), len(probes.probes))
+    rest = at_probes - base[:, probes.probes]
+    near = [rest[:, probes.nearest[:, i]] for i in range(NEAREST)]
+    spread = functools.reduce(jnp.maximum, near) - functools.reduce(jnp.minimum, near)
+    albedo = material.specular
+    specular = albedo.T if albedo.ndim == 2 else albedo.reshape(-1, 1)
+    active = jnp.max(spread * specular, axis=0) * exposure >= threshold
+    carried = base + sum(w[None] * n for w, n in zip(probes.weights.T, near, strict=True))
+    glossy = jnp.where(active[None], compacted(in_full, active), carried).T
+
+    diffuse = shade_diffuse(light, transfer, material.diffuse)
+    color = diffuse + jnp.multiply(*align(glossy, material.specular))
+    shares = {
+        "probes": jnp.asarray(len(probes.probes) / len(active), light.dtype),
+        "specular": jnp.mean(active.astype(light.dtype)),
+    }
+    target, few = probes.degree, probes.base
+    once = sum_cost(few.degree, few.samples.shape[1], target) + product_cost(
+        "diffuse", 0, target, target
+    )
+    again = sum_cost(target, probes.samples.shape[1], target)
+    return AdaptiveResult(color, shares, once + again * (shares["probes"] + shares["specular"]))

@@ -1,0 +1,97 @@
+"""A transfer at several degrees, each as values in directions, for methods that recompute."""
+
+import functools
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from ..harmonics import degree_of
+from ..harmonics._fence import fenced
+from ..harmonics._indexing import check_degree
+from ..transfer import SampledTransfer, Transfer, sample
+from ..transfer._lobe import lobe
+from ..transfer._nodes import product_nodes
+
+
+class StagedTransfer(eqx.Module):
+    """A transfer ready for `shade_two_stage`, made once by `stage`.
+
+    All vertices at two low degrees, and vertex by vertex the values of the whole transfer at
+    nodes: the form in which any vertices, wherever they are, are recomputed in full fast.
+    """
+
+    transfer: Transfer
+    base: SampledTransfer
+    middle: SampledTransfer
+    samples: Float[Array, "v n"]
+    degree: int = eqx.field(static=True)
+
+    @property
+    def degrees(self) -> tuple[int, int, int]:
+        """Of base, middle and light."""
+        return self.base.degree, self.middle.degree, self.degree
+
+
+def stage(
+    transfer: Transfer, degree: int | None = None, *, middle: int | None = None, base: int = 2
+) -> StagedTransfer:
+    """The transfer, ready for `shade_two_stage` with lights of `degree` (default: its own).
+
+    `middle` is the degree of the first stage (default: three fifths of `degree`, but at least
+    `base`), and `base` the one below which nobody falls. Raises `ValueError` unless
+    base <= middle <= degree <= the transfer's.
+    """
+    degree = transfer.degree if degree is None else check_degree(degree)
+    base = check_degree(base)
+    middle = max(3 * degree // 5, base) if middle is None else check_degree(middle)
+    if not base <= middle <= degree <= transfer.degree:
+        raise ValueError(
+            f"expected base <= middle <= degree <= the transfer's, {transfer.degree}, got {base}, "
+            f"{middle} and {degree}"
+        )
+    return StagedTransfer(
+        transfer,
+        sample(transfer, base),
+        sample(transfer, middle),
+        sample_rows(transfer.coefficients, degree),
+        degree,
+    )
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def sample_rows(coefficients: Float[Array, "v k"], degree: int) -> Float[Array, "v n"]:
+    """Values at the nodes of a degree, vertex by vertex."""
+    basis = jnp.asarray(product_nodes(degree).basis, coefficients.dtype)
+    return _matmul(coefficients[:, : basis.shape[1]], basis.T)
+
+
+def row_products(
+    light: Float[Array, "3 k"],
+    samples: Float[Array, "v n"],
+    axis: Float[Array, "3 v"],
+    lobes: Float[Array, "bands ..."],
+    rows: Int[Array, " b"],
+) -> Float[Array, "3 b"]:
+    """∫ L O lobe(B·ω) dω of some vertices: what `shade_glossy` does for all."""
+    nodes = product_nodes(degree_of(light.shape[-1]))
+    directions, project = (jnp.asarray(a, light.dtype) for a in (nodes.directions, nodes.project))
+    weights = _matmul(light, project).T
+    if lobes.ndim == 2:
+        lobes = lobes.at[:, rows].get(mode="promise_in_bounds")
+    lobes = lobes.reshape(len(lobes), -1, 1)
+    x, y, z = directions.T[:, None]
+
+    def lobed(axis, samples, lobes, rows):
+        # Gathered here, where it is used: XLA writes a gather of its own out at half the speed.
+        some = samples.at[rows].get(mode="promise_in_bounds")
+        a, b, c = axis[..., None]
+        return some * lobe(x * a + y * b + z * c, lobes)
+
+    axis = axis.at[:, rows].get(mode="promise_in_bounds")
+    return _matmul(fenced(lobed, axis, samples, lobes, rows), weights).T
+
+
+def _matmul(a, b):
+    return jnp.matmul(a, b, precision="highest")

@@ -1,0 +1,96 @@
+"""Tile sets for a camera that moves: split beforehand for many views, the nearest taken."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float, Int
+
+from ..sphere import fibonacci
+from ..transfer import Transfer
+from ..transfer._checks import checked_eye
+from ._tile_sets import BLOCK, TileSet, Tiling, arrange, make_tiling, vertex_areas
+
+
+class TileAtlas(eqx.Module):
+    """Tilings of one mesh for eyes all around it. Made by `make_tile_atlas`.
+
+    Indices alone, 4 bytes a vertex and view; the transfer is put in a view's order when needed.
+    """
+
+    order: Int[Array, "views blocks b"]
+    tile: Int[Array, "views blocks"]
+    directions: Float[Array, "views 3"]  # from the centre to each eye
+    centre: Float[Array, " 3"]  # of the mesh's box; zero where the eyes are far away
+    areas: Float[Array, " v"]  # relative
+    count: int = eqx.field(static=True)
+
+    def view(self, eye: Float[ArrayLike, " 3"]) -> int:
+        """The number of the view whose direction is nearest to that of `eye`."""
+        towards = np.asarray(checked_eye(eye, self.centre.dtype)) - np.asarray(self.centre)
+        return int(np.argmax(np.asarray(self.directions) @ towards))
+
+    def tiling(self, view: int) -> Tiling:
+        return Tiling(self.order[view], self.tile[view], self.count)
+
+    def nearest(self, transfer: Transfer, eye: Float[ArrayLike, " 3"]) -> TileSet:
+        """The tile set of the nearest view. All sets of an atlas have the same shapes."""
+        return self.arranged(transfer, self.view(eye))
+
+    def arranged(self, transfer: Transfer, view: int) -> TileSet:
+        """The tile set of a view, by its number."""
+        return arrange(transfer, self.tiling(view), self.areas)
+
+
+def make_tile_atlas(
+    transfer: Transfer,
+    *,
+    distance: float | None = None,
+    views: int = 128,
+    count: int = 192,
+    block: int = BLOCK,
+) -> TileAtlas:
+    """Tilings for `views` directions, spread evenly over the sphere.
+
+    The eyes stand at `distance` from the centre of the mesh's box, or far away (default). Other
+    arguments and errors as for `make_tiles`; raises `ValueError` for fewer than one view too.
+    """
+    if views < 1:
+        raise ValueError(f"expected at least 1 view, got {views}")
+    directions = fibonacci(views).directions.astype(transfer.positions.dtype)
+    distant, centre = distance is None, jnp.zeros((3,), transfer.positions.dtype)
+    eyes = directions
+    if distance is not None:
+        centre = (transfer.positions.max(axis=0) + transfer.positions.min(axis=0)) / 2
+        eyes = centre[None] + distance * directions
+    areas = vertex_areas(transfer)
+    tilings = [
+        make_tiling(transfer, eye, distant=distant, count=count, block=block, areas=areas)
+        for eye in eyes
+    ]
+    order, tile = (jnp.stack([getattr(one, name) for one in tilings]) for name in ("order", "tile"))
+    return TileAtlas(order, tile, directions, centre, jnp.asarray(areas), tilings[0].count)
+
+
+class TileFollower:
+    """Follows an eye with the sets of an atlas, without waiting until the next one is ready.
+
+    The set of the nearest view is arranged in the background while frames go on with the one
+    before, whose accuracy falls off slowly with the angle between the views. Frames meanwhile
+    share the machine with that and are slower, and starting it takes a moment of its own.
+    """
+
+    def __init__(self, atlas: TileAtlas, transfer: Transfer, eye: Float[ArrayLike, " 3"]):
+        self._atlas, self._transfer = atlas, transfer
+        self._view = atlas.view(eye)
+        self._current = self._next = atlas.arranged(transfer, self._view)
+
+    def __call__(self, eye: Float[ArrayLike, " 3"]) -> TileSet:
+        """The newest set that is ready."""
+        if all(leaf.is_ready() for leaf in jax.tree.leaves(self._next)):
+            self._current = self._next
+            view = self._atlas.view(eye)
+            if view != self._view:
+                self._view = view
+                self._next = self._atlas.arranged(self._transfer, view)
+        return self._current

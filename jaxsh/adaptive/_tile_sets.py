@@ -1,0 +1,170 @@
+"""Which vertices share a tile: those that mirror the eye into nearly the same direction."""
+
+import heapq
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float, Int
+
+from ..harmonics import degree_of
+from ..transfer import Transfer
+from ..transfer._checks import checked_eye
+from ..transfer._lobe import reflected
+
+# Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
+BLOCK = 128
+
+
+class Tiling(eqx.Module):
+    """Vertices in blocks, blocks in tiles: indices alone. Made by `make_tiling`.
+
+    `order` names the vertex at each place, with some vertices twice where blocks must be filled
+    up; `tile` is the tile of each block, ascending.
+    """
+
+    order: Int[Array, "blocks b"]
+    tile: Int[Array, " blocks"]
+    count: int = eqx.field(static=True)
+
+
+class TileSet(eqx.Module):
+    """A transfer in the order of a tiling, ready for frame after frame. Made by `make_tiles`.
+
+    It serves any eye, and best the one it was made for. Sets of one mesh, count and block have
+    the same shapes, so that code compiled for one serves all.
+    """
+
+    tiling: Tiling
+    place: Int[Array, " v"]  # where in `order` each vertex is
+    coefficients: Float[Array, "blocks k b"]
+    positions: Float[Array, "places 3"]
+    normals: Float[Array, "places 3"]
+    areas: Float[Array, "blocks b"]  # relative; 0 where a vertex stands a second time
+
+    @property
+    def degree(self) -> int:
+        return degree_of(self.coefficients.shape[1])
+
+
+def make_tiles(
+    transfer: Transfer,
+    eye: Float[ArrayLike, " 3"],
+    *,
+    distant: bool = False,
+    count: int = 192,
+    block: int = BLOCK,
+) -> TileSet:
+    """Tiles for the view from `eye`: the transfer regrouped by reflected direction.
+
+    **Arguments**
+
+    - `transfer`: concrete.
+    - `eye`: a point, or with `distant` the direction to an eye far away.
+    - `count`: of tiles. More are more exact, and cost more per frame.
+    - `block`: the number of vertices that a tile's size is a multiple of.
+
+    Takes the transfer's memory once more. Neither traceable nor differentiable; raises
+    `ValueError` for an eye that is no vector and for a count or block below 1.
+    """
+    return arrange(transfer, make_tiling(transfer, eye, distant=distant, count=count, block=block))
+
+
+def make_tiling(
+    transfer: Transfer,
+    eye: Float[ArrayLike, " 3"],
+    *,
+    distant: bool = False,
+    count: int = 192,
+    block: int = BLOCK,
+    areas: Float[ArrayLike, " v"] | None = None,
+) -> Tiling:
+    """Split all vertices again and again, the costliest tile first, into `count` tiles.
+
+    A tile costs Σ area·(max(n·ω_o, 0) + 0.05)·|B - B̄|⁶, in proportion to the squared error of a
+    quadratic, and is split at the middle of its extent along its longest axis. Where there are
+    fewer blocks than `count`, each is a tile. Arguments and errors as for `make_tiles`; `areas` of
+    the vertices, from `vertex_areas`, where they are known already.
+    """
+    if count < 1 or block < 1:
+        raise ValueError(f"expected count and block of at least 1, got {count} and {block}")
+    eye = checked_eye(eye, transfer.positions.dtype)
+    axis = np.asarray(reflected(eye, transfer.positions, transfer.normals, distant), np.float32)
+    facing = np.sum(np.asarray(transfer.normals).T * axis, axis=0)
+    areas = vertex_areas(transfer) if areas is None else np.asarray(areas)
+    weights = areas * (np.maximum(facing, 0) + 0.05)
+    blocks = -(-len(weights) // block)
+    spare = blocks * block - len(weights)
+    vertices = np.concatenate([np.arange(len(weights)), np.full(spare, len(weights) - 1)])
+    tiles = _split(axis.T, weights, vertices, min(count, blocks), block)
+    sizes = [len(tile) // block for tile in tiles]
+    return Tiling(
+        jnp.asarray(np.concatenate(tiles).reshape(-1, block).astype(np.int32)),
+        jnp.asarray(np.repeat(np.arange(len(tiles), dtype=np.int32), sizes)),
+        len(tiles),
+    )
+
+
+def arrange(
+    transfer: Transfer, tiling: Tiling, areas: Float[ArrayLike, " v"] | None = None
+) -> TileSet:
+    """The transfer in the order of a tiling, whose `areas` `TileAtlas` knows already.
+
+    Raises `ValueError` where it is of another mesh.
+    """
+    order, vertices = np.asarray(tiling.order), len(transfer.positions)
+    place = np.full(vertices, -1, np.int32)
+    place[order.ravel()] = np.arange(order.size, dtype=np.int32)
+    if order.max() >= vertices or place.min() < 0:
+        raise ValueError(f"expected a tiling of {vertices} vertices, got one of {order.max() + 1}")
+    first = place[order].ravel() == np.arange(order.size)
+    areas = vertex_areas(transfer) if areas is None else np.asarray(areas)
+    areas = areas[order] * first.reshape(order.shape)
+    return _arrange(transfer, tiling, jnp.asarray(place), jnp.asarray(areas))
+
+
+@jax.jit
+def _arrange(transfer, tiling, place, areas):
+    order = tiling.order.reshape(-1)
+    coefficients = jax.lax.map(
+        lambda rows: transfer.coefficients.at[rows].get(mode="promise_in_bounds").T, tiling.order
+    )
+    positions, normals = transfer.positions[order], transfer.normals[order]
+    areas = areas.astype(coefficients.dtype)
+    return TileSet(tiling, place, coefficients, positions, normals, areas)
+
+
+def _split(axis, weights, vertices, count, block) -> list[np.ndarray]:
+    serial, queue = 0, []
+
+    def push(members):
+        nonlocal serial
+        serial += 1
+        weight, offsets = weights[members], axis[members]
+        offsets = offsets - weight @ offsets / weight.sum()
+        cost = weight @ np.sum(offsets * offsets, axis=1) ** 3
+        # A single block stays whole: it waits behind all that can be split.
+        heapq.heappush(queue, (-cost if len(members) > block else 1.0, serial, members, offsets))
+
+    push(vertices)
+    while len(queue) < count:
+        *_, members, offsets = heapq.heappop(queue)
+        _, vectors = np.linalg.eigh(offsets.T @ (weights[members, None] * offsets))
+        along = offsets @ vectors[:, -1]
+        middle = np.count_nonzero(along < (along.min() + along.max()) / 2)
+        cut = block * int(np.clip(round(middle / block), 1, len(members) // block - 1))
+        parts = np.argpartition(along, cut)
+        push(members[parts[:cut]])
+        push(members[parts[cut:]])
+    return [members for *_, members, _ in queue]
+
+
+def vertex_areas(transfer: Transfer) -> Float[np.ndarray, " v"]:
+    """The mean squared length of a vertex's edges, relative to that of all: its area, roughly."""
+    points, neighbors = np.asarray(transfer.positions), np.asarray(transfer.neighbors)
+    real = neighbors != np.arange(len(points))[:, None]
+    squares = np.sum((points[neighbors] - points[:, None]) ** 2, axis=(1, 2))
+    areas = squares / np.maximum(real.sum(axis=1), 1)
+    mean = areas.mean()
+    return np.maximum(areas / mean, 1e-3) if mean > 0 else np.ones_like(areas)
