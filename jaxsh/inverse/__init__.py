@@ -5,7 +5,20 @@ many places at once, so that it does not end in the wrong valley, and none that 
 stays silent.
 """
 
+from ._fit_colors import fit_colors
+from ._fit_polygons import fit_polygons
 from ._fit_sky import SkyLight, fit_sky
+from ._rectangle import Rectangle, rectangle_of
 from ._result import Confidence, Recovered, Statistics
 
-__all__ = ["Confidence", "Recovered", "SkyLight", "Statistics", "fit_sky"]
+__all__ = [
+    "Confidence",
+    "Recovered",
+    "Rectangle",
+    "SkyLight",
+    "Statistics",
+    "fit_colors",
+    "fit_polygons",
+    "fit_sky",
+    "rectangle_of",
+]

@@ -9,16 +9,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, ArrayLike, Float
 
 from .. import sky as sky_room
-from ..harmonics._checks import as_float, is_concrete
 from ..transfer import Transfer
 from ._charts import even_hemisphere, from_hemisphere, tangents, to_hemisphere, to_interval
+from ._checks import check_data, check_end
 from ._result import Confidence, Recovered, Statistics
 from ._shading import Shading, compress
-from ._solve import covariance, levenberg_marquardt
+from ._solve import confidence, levenberg_marquardt
 
 Sky = Callable[..., Array]
 
@@ -86,12 +85,7 @@ def fit_sky(
     Raises `ValueError` for shapes that do not fit, and, where values are known, for data that
     are not finite, all zero, or weighted by less than 0.
     """
-    coefficients = transfer.coefficients
-    dtype, count = coefficients.dtype, len(coefficients)
-    observed, albedo = as_float(observed).astype(dtype), as_float(albedo).astype(dtype)
-    weights = jnp.ones(count, dtype) if weights is None else as_float(weights).astype(dtype)
-    _check_shapes(observed, albedo, weights, count)
-    _check_values(observed, weights)
+    observed, albedo, weights = check_data(observed, transfer, albedo, weights)
     low, high = turbidity
     if not 0 < low < high < math.inf:
         raise ValueError(f"turbidity must be bounds 0 < low < high, got {turbidity}")
@@ -103,22 +97,17 @@ def fit_sky(
         sky = _preetham(min(transfer.degree, 6), low >= 2.5 and high <= 6)
     recovered = _fit(
         observed,
-        coefficients,
+        transfer.coefficients,
         albedo,
         weights,
         sky=sky,
         bounds=(float(low), float(high)),
         exposure=exposure,
         starts=starts,
-        tolerance=_tolerance(dtype) if tolerance is None else tolerance,
+        tolerance=_tolerance(observed.dtype) if tolerance is None else tolerance,
         max_steps=max_steps,
     )
-    if throw and is_concrete(recovered.statistics.steps) and not recovered.converged:
-        raise RuntimeError(
-            f"the sky was not found in {int(recovered.statistics.steps)} steps from "
-            f"{starts} starts, residual {float(recovered.statistics.residual):.1e}: "
-            f"{recovered.message} throw=False gives the best that was met"
-        )
+    check_end(recovered, "the sky was", throw=throw)
     return recovered
 
 
@@ -148,7 +137,7 @@ def _fit(
         brightness = jax.vmap(lambda p: _brightness(shading, sky, to_sky(p, bounds)))(first)
         first = jnp.concatenate([first, jnp.log(brightness)[:, None]], axis=1)
     solved = levenberg_marquardt(
-        lambda p: _residual(shading, sky, decode(p)),
+        lambda p, _: _residual(shading, sky, decode(p)),
         first,
         tolerance=tolerance,
         max_steps=max_steps,
@@ -168,8 +157,8 @@ def _fit(
     )
     free = 3 * jnp.sum(weights > 0) - first.shape[1]
     variance = squared / jnp.maximum(free, 1).astype(squared.dtype)
-    confidence = _confidence(shading, sky, value, variance, exposure is None)
-    return Recovered(value, solved.result, statistics, confidence)
+    spread = _confidence(shading, sky, value, variance, exposure is None)
+    return Recovered(value, solved.result, statistics, spread)
 
 
 def to_sky(p: Float[Array, " p"], bounds: tuple[float, float]) -> SkyLight:
@@ -206,37 +195,4 @@ def _confidence(shading, sky, value: SkyLight, variance, free: bool) -> Confiden
         return SkyLight(sun, value.turbidity + step[2], factor)
 
     still = jnp.zeros(3 + free, value.sun.dtype)
-    jacobian = jax.jacfwd(lambda step: _residual(shading, sky, moved(step)))(still)
-    carried = jax.jacfwd(lambda step: ravel_pytree(moved(step))[0])(still)
-    spread = covariance(jacobian, variance)
-    whole = jnp.isfinite(spread).all()
-    spread = jnp.where(whole, spread, 0)
-    spread = jnp.einsum("ip,pq,jq->ij", carried, spread, carried, precision="highest")
-    spread = jnp.where(whole, spread, jnp.inf)
-    _, unravel = ravel_pytree(value)
-    return Confidence(spread, unravel(jnp.sqrt(jnp.maximum(jnp.diagonal(spread), 0))))
-
-
-def _check_shapes(observed, albedo, weights, count: int) -> None:
-    if observed.shape != (count, 3):
-        raise ValueError(f"expected observed ({count}, 3), got shape {observed.shape}")
-    if albedo.shape not in ((), (3,), (count, 1), (count, 3)):
-        raise ValueError(
-            f"expected albedo as a number, (3,), ({count}, 1) or ({count}, 3), got shape "
-            f"{albedo.shape}"
-        )
-    if weights.shape != (count,):
-        raise ValueError(f"expected weights ({count},), got shape {weights.shape}")
-
-
-def _check_values(observed: Array, weights: Array) -> None:
-    if not (is_concrete(observed) and is_concrete(weights)):
-        return
-    numbers, trust = np.asarray(observed), np.asarray(weights)
-    if not (np.isfinite(trust) & (trust >= 0)).all():
-        raise ValueError("weights must be finite and at least 0")
-    bad = int((~np.isfinite(numbers[trust > 0])).sum())
-    if bad:
-        raise ValueError(f"{bad} numbers of observed are NaN or infinite: give them weight 0")
-    if not np.any(numbers[trust > 0]):
-        raise ValueError("observed is zero wherever it has a weight: there is no light to recover")
+    return confidence(lambda light: _residual(shading, sky, light), moved, still, variance)

@@ -1,4 +1,4 @@
-"""Diffuse shading, made small: as many equations as the light has coefficients."""
+"""Diffuse shading of a transfer: made small for one light, and of a near light."""
 
 import math
 
@@ -6,6 +6,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+from ..midrange import Polygon, polygon_harmonics
+from ..transfer import Transfer
 
 
 class Shading(eqx.Module):
@@ -53,3 +56,9 @@ def compress(
     triangles = jax.lax.map(triangle, (albedo.T, columns))
     operator, target = triangles[..., :count], triangles[..., count:]
     return Shading(jnp.moveaxis(target, -1, 0 if shared else 1).reshape(3, -1), operator, scale)
+
+
+def irradiance(polygon: Polygon, transfer: Transfer) -> Float[Array, " v"]:
+    """From a polygon at each vertex, in the first channel."""
+    c = polygon_harmonics(polygon, transfer.positions, transfer.degree)[:, 0]
+    return jnp.sum(transfer.coefficients * c, axis=-1)

@@ -3,13 +3,33 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
+from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, Int
+
+from ._result import Confidence
 
 # Ends whose residuals differ by less than this, in units of the data, are in the same valley.
 _SAME = 1e-3
+
+
+class _Damping(optx.AbstractSearch):
+    """Optimistix's, with its state in the unknowns' dtype, not in JAX's default float.
+
+    Otherwise fits in float32 fail under `jax_enable_x64`.
+    """
+
+    search: optx.ClassicalTrustRegion
+
+    def init(self, y, f_info_struct):
+        state = self.search.init(y, f_info_struct)
+        return jax.tree.map(lambda leaf: leaf.astype(y.dtype), state)
+
+    def step(self, first_step, y, y_eval, f_info, f_eval_info, state):
+        return self.search.step(first_step, y, y_eval, f_info, f_eval_info, state)
 
 
 class Solved(NamedTuple):
@@ -17,42 +37,47 @@ class Solved(NamedTuple):
     residual: Float[Array, " r"]
     result: Any
     steps: Int[Array, ""]
+    start: Int[Array, ""]
     agreeing: Int[Array, ""]
 
 
 def levenberg_marquardt(
-    residual: Callable[[Float[Array, " p"]], Float[Array, " r"]],
+    residual: Callable[[Float[Array, " p"], Any], Float[Array, " r"]],
     starts: Float[Array, "s p"],
+    constants: Any = None,
     *,
     tolerance: float,
     max_steps: int,
 ) -> Solved:
     """The least ‖residual‖² that any of the starts leads to; residuals in units of the data.
 
+    `residual` takes the unknowns and, of the `constants`, a tree of arrays, those of its start.
     Among ends as good as the best, one that has converged goes before one that has not.
     """
     solver = optx.LevenbergMarquardt(tolerance, tolerance)
+    solver = eqx.tree_at(lambda s: s.search, solver, _Damping(solver.search))
 
-    def with_itself(p, _):
-        value = residual(p)
+    def with_itself(p, constants):
+        value = residual(p, constants)
         return value, value
 
     def one(start):
+        p, args = start
         solution = optx.least_squares(
-            with_itself, solver, start, has_aux=True, max_steps=max_steps, throw=False
+            with_itself, solver, p, args, has_aux=True, max_steps=max_steps, throw=False
         )
         return solution.value, solution.aux, solution.result, solution.stats["num_steps"]
 
     # One after the other: each stops when it is done, and XLA compiles this three times as fast
     # as all side by side.
-    values, residuals, results, steps = jax.lax.map(one, starts)
+    values, residuals, results, steps = jax.lax.map(one, (starts, constants))
     costs = jnp.sum(residuals**2, axis=-1)
     costs = jnp.where(jnp.isfinite(costs), costs, jnp.inf)
     same = jnp.linalg.norm(residuals - residuals[jnp.argmin(costs)][None], axis=-1) < _SAME
     done = same & (results == optx.RESULTS.successful)
     best = jnp.argmin(jnp.where(jnp.where(done.any(), done, same), costs, jnp.inf))
     result = jax.tree.map(lambda r: r[best], results)
-    return Solved(values[best], residuals[best], result, steps[best], jnp.sum(same))
+    return Solved(values[best], residuals[best], result, steps[best], best, jnp.sum(same))
 
 
 def covariance(jacobian: Float[Array, "r p"], variance: Float[Array, ""]) -> Float[Array, "p p"]:
@@ -61,7 +86,26 @@ def covariance(jacobian: Float[Array, "r p"], variance: Float[Array, ""]) -> Flo
     lengths = jnp.linalg.norm(jacobian, axis=0)
     scaled = jacobian / jnp.where(lengths > 0, lengths, 1)[None]
     _, singular, vt = jnp.linalg.svd(scaled, full_matrices=False)
-    full = singular[-1] > jnp.finfo(jacobian.dtype).eps * len(jacobian)
+    # A column of rounding errors of the size of its elements is about eps long, however tall.
+    full = singular[-1] > 10 * jnp.finfo(jacobian.dtype).eps * jacobian.shape[1]
     inverse = vt / jnp.where(full, singular, 1)[:, None] / jnp.where(lengths > 0, lengths, 1)[None]
     spread = variance * jnp.matmul(inverse.T, inverse, precision="highest")
     return jnp.where(full & jnp.all(lengths > 0), spread, jnp.inf)
+
+
+def confidence(
+    residual: Callable[[Any], Float[Array, " r"]],
+    moved: Callable[[Float[Array, " p"]], Any],
+    still: Float[Array, " p"],
+    variance: Float[Array, ""],
+) -> Confidence[Any]:
+    """Of the value `moved(still)`, from the slopes of its residual and of itself."""
+    jacobian = jax.jacfwd(lambda step: residual(moved(step)))(still)
+    carried = jax.jacfwd(lambda step: ravel_pytree(moved(step))[0])(still)
+    spread = covariance(jacobian, variance)
+    whole = jnp.isfinite(spread).all()
+    spread = jnp.where(whole, spread, 0)
+    spread = jnp.einsum("ip,pq,jq->ij", carried, spread, carried, precision="highest")
+    spread = jnp.where(whole, spread, jnp.inf)
+    _, unravel = ravel_pytree(moved(still))
+    return Confidence(spread, unravel(jnp.sqrt(jnp.maximum(jnp.diagonal(spread), 0))))

@@ -1,0 +1,64 @@
+"""What every fit asks of its data, and what it says where it did not end well."""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ..harmonics._checks import as_float, is_concrete
+from ..transfer import Transfer
+from ._result import Recovered
+
+
+def check_data(
+    observed: Float[ArrayLike, "..."],
+    transfer: Transfer,
+    albedo: Float[ArrayLike, "..."],
+    weights: Float[ArrayLike, "..."] | None,
+) -> tuple[Float[Array, "v 3"], Float[Array, "..."], Float[Array, " v"]]:
+    """Observed, albedo and weights in the transfer's dtype; without weights, ones.
+
+    Raises `ValueError` for shapes that do not fit, and, where values are known, for data that
+    are not finite, all zero, or weighted by less than 0.
+    """
+    dtype, count = transfer.coefficients.dtype, len(transfer.coefficients)
+    observed, albedo = as_float(observed).astype(dtype), as_float(albedo).astype(dtype)
+    weights = jnp.ones(count, dtype) if weights is None else as_float(weights).astype(dtype)
+    _check_shapes(observed, albedo, weights, count)
+    _check_values(observed, weights)
+    return observed, albedo, weights
+
+
+def check_end(recovered: Recovered, what: str, *, throw: bool) -> None:
+    """Raises `RuntimeError` where a fit of `what` has not converged, if it may and can."""
+    statistics = recovered.statistics
+    if throw and is_concrete(statistics.steps) and not recovered.converged:
+        raise RuntimeError(
+            f"{what} not found in {int(statistics.steps)} steps from {statistics.starts} starts, "
+            f"residual {float(statistics.residual):.1e}: {recovered.message} throw=False gives "
+            "the best that was met"
+        )
+
+
+def _check_shapes(observed: Array, albedo: Array, weights: Array, count: int) -> None:
+    if observed.shape != (count, 3):
+        raise ValueError(f"expected observed ({count}, 3), got shape {observed.shape}")
+    if albedo.shape not in ((), (3,), (count, 1), (count, 3)):
+        raise ValueError(
+            f"expected albedo as a number, (3,), ({count}, 1) or ({count}, 3), got shape "
+            f"{albedo.shape}"
+        )
+    if weights.shape != (count,):
+        raise ValueError(f"expected weights ({count},), got shape {weights.shape}")
+
+
+def _check_values(observed: Array, weights: Array) -> None:
+    if not (is_concrete(observed) and is_concrete(weights)):
+        return
+    numbers, trust = np.asarray(observed), np.asarray(weights)
+    if not (np.isfinite(trust) & (trust >= 0)).all():
+        raise ValueError("weights must be finite and at least 0")
+    bad = int((~np.isfinite(numbers[trust > 0])).sum())
+    if bad:
+        raise ValueError(f"{bad} numbers of observed are NaN or infinite: give them weight 0")
+    if not np.any(numbers[trust > 0]):
+        raise ValueError("observed is zero wherever it has a weight: there is no light to recover")

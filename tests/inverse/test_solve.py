@@ -1,0 +1,26 @@
+"""The solver by itself, on what needs no mesh."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+import pytest
+
+from jaxsh.inverse._solve import levenberg_marquardt
+
+
+@pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
+def test_the_best_start_wins_in_either_dtype_under_x64(dtype):
+    """A circle's constant and a slope: from the constant 4 it ends in a worse valley."""
+
+    def residual(p, constant):
+        return jnp.stack([p[0] ** 2 - constant, p[1] - p[0], 0.5 * (p[0] - 1)])
+
+    starts, constants = jnp.array([[3.0, 0.0], [2.0, 1.0]], dtype), jnp.array([4.0, 1.0], dtype)
+    solved = jax.jit(
+        lambda: levenberg_marquardt(residual, starts, constants, tolerance=1e-4, max_steps=50)
+    )()
+    assert solved.parameters.dtype == solved.residual.dtype == dtype
+    assert solved.result == optx.RESULTS.successful
+    assert (solved.start, solved.agreeing) == (1, 1)
+    np.testing.assert_allclose(solved.parameters, [1, 1], rtol=0, atol=1e-5)
