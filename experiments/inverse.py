@@ -1,7 +1,8 @@
-"""Light recovered from shading: the sun and the turbidity from the vertices of a mesh.
+"""Light recovered from shading: the sun and the turbidity, area lights, and their colours.
 
-A mesh is shaded by the exact projection of the sky, through transfer with shadows; noise is
-added; and `inverse.fit_sky`, which knows only the shipped fit of the sky, has to say what it was.
+Here is the sky; `_inverse_emitters` and `_inverse_colors` register the others. A mesh is shaded by
+the exact projection of the sky, through transfer with shadows; noise is added; and
+`inverse.fit_sky`, which knows only the shipped fit of the sky, has to say what it was.
 """
 
 import dataclasses
@@ -17,6 +18,8 @@ from jaxtyping import Array, Float
 from jaxsh import inverse, sky, transfer
 
 from . import Column, Context, Table, experiment
+from ._inverse_colors import colors as colors
+from ._inverse_emitters import emitters as emitters
 from ._inverse_pictures import Case, draw_errors, draw_sky
 
 
