@@ -1,7 +1,7 @@
 # Two commands on a fresh machine with Python >= 3.11:
 #   make reproduce   the main job, on the embedded default (or JAXSH_DATA=folder)
 #   make test        the tests
-# Also: make check (lint, types), make bench (beside the peers), make clean.
+# Also: make test-all (with the slow ones), make check (lint, types), make bench (beside the peers), make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -9,7 +9,7 @@ BENCH_VENV ?= .venv-bench
 PRESET ?= quick
 bin := $(VENV)/bin
 
-.PHONY: reproduce test check bench clean
+.PHONY: reproduce test test-all check bench clean
 
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -29,6 +29,9 @@ reproduce: $(VENV)/installed
 
 test: $(VENV)/installed
 	$(bin)/python -m pytest -n auto --dist worksteal
+
+test-all: $(VENV)/installed
+	$(bin)/python -m pytest -n auto --dist worksteal -m ""
 
 check: $(VENV)/installed
 	$(bin)/ruff check .

@@ -19,7 +19,7 @@ from ._inverse_lights import shade, with_noise
 if TYPE_CHECKING:
     from ._inverse_emitters import Emitters
 
-_GAIN = 20
+_GAIN = 20.0
 _ASIDE = (0.9, -1.6, 0.9)  # from where lights and mesh are seen together
 _GREY = 0.2
 
@@ -52,7 +52,9 @@ def draw(
     panels = {
         f"observed, noise {100 * scene.noise:g} %": view.shown(observed),
         "with the lights recovered": view.shown(again),
-        f"difference from the light without noise, × {_GAIN}": view.difference(again, clean, _GAIN),
+        f"difference from the light without noise, × {_GAIN:g}": view.difference(
+            again, clean, _GAIN
+        ),
     }
     figure, axes = plt.subplots(1, 4, figsize=(14, 3.9), layout="constrained")
     for axis, (title, image) in zip(axes, panels.items(), strict=False):

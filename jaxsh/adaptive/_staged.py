@@ -39,13 +39,14 @@ def stage(
 ) -> StagedTransfer:
     """The transfer, ready for `shade_two_stage` with lights of `degree` (default: its own).
 
-    `middle` is the degree of the first stage (default: three fifths of `degree`, but at least
-    `base`), and `base` the one below which nobody falls. Raises `ValueError` unless
-    base <= middle <= degree <= the transfer's.
+    `middle` is the degree of the first stage (default: three fifths of `degree`, but above `base`,
+    or there is no change to see), and `base` the one below which nobody falls. Raises `ValueError`
+    unless base <= middle <= degree <= the transfer's.
     """
     degree = transfer.degree if degree is None else check_degree(degree)
     base = check_degree(base)
-    middle = max(3 * degree // 5, base) if middle is None else check_degree(middle)
+    default = min(max(3 * degree // 5, base + 1), degree)
+    middle = default if middle is None else check_degree(middle)
     if not base <= middle <= degree <= transfer.degree:
         raise ValueError(
             f"expected base <= middle <= degree <= the transfer's, {transfer.degree}, got {base}, "

@@ -93,7 +93,9 @@ def twin(light, made, eye, material, *, base, thresholds, outside, exposure, rin
     return color, reached, kept
 
 
-@pytest.mark.parametrize("options", [REFINED, PLAIN], ids=["refined", "plain"])
+@pytest.mark.parametrize(
+    "options", [pytest.param(REFINED, marks=pytest.mark.slow), PLAIN], ids=["refined", "plain"]
+)
 def test_masks_follow_the_appendix(rng, options):
     inputs = scene(rng)
     thresholds = {"diffuse": 0.12, "specular": 0.15}
@@ -175,6 +177,7 @@ def test_hysteresis_holds_whom_the_last_frame_held(rng):
             np.testing.assert_array_equal(held.reached[kind], expected.reached[kind])
 
 
+@pytest.mark.slow
 def test_filtered_derivatives(rng):
     light, made, eye, material = scene(rng)
 

@@ -69,6 +69,7 @@ def test_number_of_refined_vertices_is_no_new_program(scene):
     assert _probes._shade_probes._cache_size() == before
 
 
+@pytest.mark.slow
 def test_probes_differentiate_as_the_full_computation(scene, rng):
     light, ball, probes = scene
     weights = jnp.asarray(rng.normal(size=(COUNT, 3)))

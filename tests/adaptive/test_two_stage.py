@@ -53,6 +53,7 @@ def test_a_transfer_is_staged_on_the_way(rng):
     )
 
 
+@pytest.mark.slow
 def test_two_stages_refined_and_smoothed(rng):
     light, made, eye, material = inputs = staged(rng)
     white = Material(0 * material.diffuse, 0 * material.specular + 1, material.exponent)

@@ -66,6 +66,7 @@ def assert_picture(folder, table, name):
     assert f"({name})" in table
 
 
+@pytest.mark.slow
 class TestFigure7:
     def test_gradients_help_and_those_of_edges_more(self, results):
         folder, table, rows = results("figure7")
@@ -104,6 +105,7 @@ class TestFigure8:
 ORDERS = "constant", "first order", "second order", "third order"
 
 
+@pytest.mark.slow
 class TestClaims:
     def test_error_falls_with_distance_samples_gradients_and_orders(self, results):
         folder, table, rows = results("claims")
@@ -137,6 +139,7 @@ class TestClaims:
 
 
 class TestOrders:
+    @pytest.mark.slow
     def test_stages_add_up_and_the_front_is_a_front(self, results):
         folder, table, rows = results("orders")
         assert [(row["samples"], row["order"]) for row in rows] == [(1, 0), (1, 1), (8, 0), (8, 1)]

@@ -56,6 +56,7 @@ def test_table1(run):
         assert f"## {title}" in table
 
 
+@pytest.mark.slow
 def test_three_lights_on_a_mesh(run):
     options = ["--directions", "16", "--size", "48", "--samples", "1"]
     folder, rows = run("figure1_5", *options)
@@ -87,6 +88,7 @@ def test_moved_under_a_light(run):
     assert (folder / "figure4.png").stat().st_size > 5_000
 
 
+@pytest.mark.slow
 def test_incident_light_at_vertices(run):
     folder, rows = run("figure6", "--size", "8", "--quantiles", "0.5", "1")
     for row in rows:

@@ -36,6 +36,7 @@ def test_day(run):
     assert (folder / "day.png").stat().st_size > 3_000
 
 
+@pytest.mark.slow
 def test_worst_case(run):
     options = ["--suns", "4", "--turbidities", "2", "--bands", "2", "7", "--samples", "16", "10"]
     folder, rows = run("habel2008.figure2", *options)
@@ -45,6 +46,7 @@ def test_worst_case(run):
     assert (folder / "figure2.png").stat().st_size > 20_000
 
 
+@pytest.mark.slow
 def test_ringing(run):
     folder, rows = run("habel2008.figure4", "--zeniths", "60", "--shown", "0")
     at = {row["window"]: row for row in rows}
@@ -72,6 +74,7 @@ def test_suns_of_the_day():
     np.testing.assert_allclose(sun_at_hour(-6, 50, 0), [1, 0, 0], atol=1e-15)  # rises in the east
 
 
+@pytest.mark.slow
 def test_inverse_sky(run):
     options = ["--noise", "0", "0.01", "--settings", "2", "--degree", "4", "--directions", "16"]
     folder, rows = run("inverse.sky", *options, "--height", "32")

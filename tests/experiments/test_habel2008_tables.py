@@ -107,6 +107,7 @@ class TestSolvers:
         assert 1e4 < condition("scaled monomials", nodes) < 1e10
         assert condition("monomials", nodes) > 1e19
 
+    @pytest.mark.slow
     def test_float32_ruins_monomials_and_no_chebyshev_series(self, results):
         rows = results("solvers")[2]
         solver = "lineax QR, linear"
@@ -127,6 +128,7 @@ class TestSolvers:
 
 
 class TestCost:
+    @pytest.mark.slow
     def test_bytes_are_the_papers(self, results):
         rows = results("cost")[2]
         seven = at(rows, what="the paper's, 7 bands")

@@ -21,6 +21,7 @@ def run(tmp_path, monkeypatch):
     return run
 
 
+@pytest.mark.slow
 def test_emitters_are_recovered(run):
     folder, (clean, noisy) = run("inverse.emitters", "--candidates", "8", "--height", "48")
     assert clean["converged"]

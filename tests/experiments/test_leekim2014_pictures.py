@@ -48,6 +48,7 @@ def scene(tmp_path, data) -> Scene:
     return Scenes(Context(tmp_path, Data()), [row], 32).load(row)
 
 
+@pytest.mark.slow
 def test_figures_1_and_9(run):
     _, rows = run("leekim2014.figure1", *ROW)
     folder, more = run("leekim2014.figure9", *ROW)
@@ -74,6 +75,7 @@ def test_figure8(run):
     assert (folder / "knot_studio.png").stat().st_size > 3_000
 
 
+@pytest.mark.slow
 def test_figure10(run):
     options = ["--frames", "3", "--sheet", "2", "--views", "2", "--windows", "none", "sinc"]
     folder, rows = run("leekim2014.figure10", *ROW, *options)
@@ -93,6 +95,7 @@ def test_figure10(run):
         assert (folder / name).stat().st_size > 5_000
 
 
+@pytest.mark.slow
 def test_glossy_near_light(run):
     folder, rows = run("annen2004.glossy", "--degree", "3", "--exponents", "8")
     assert [row["surface"] for row in rows] == [

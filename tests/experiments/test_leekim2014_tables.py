@@ -165,6 +165,7 @@ class TestTable1:
 
 
 class TestTable2:
+    @pytest.mark.slow
     def test_rows_and_plot(self, results):
         folder, table, rows = results("table2")
         assert [row["degree"] for row in rows if "fps full" in row] == [2]
@@ -191,6 +192,7 @@ class TestTable2:
 
 
 class TestThreshold:
+    @pytest.mark.slow
     def test_higher_thresholds_keep_fewer_and_lose_quality(self, results):
         folder, table, rows = results("threshold")
         plain = [row for row in rows if row["variant"] == "as it is"]
@@ -213,6 +215,7 @@ class TestThreshold:
 
 
 class TestExponent:
+    @pytest.mark.slow
     def test_rows_and_plot(self, results):
         folder, _, rows = results("exponent")
         assert [(row["exponent"], row["method"]) for row in rows] == [

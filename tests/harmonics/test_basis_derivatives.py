@@ -50,7 +50,7 @@ def jacobian(points, degree, mode):
     return jax.vmap(differentiate(lambda s: harmonics.evaluate(s, degree)))(points)
 
 
-@pytest.mark.parametrize("degree", [0, 1, 6, 13])
+@pytest.mark.parametrize("degree", [0, 1, 13])
 def test_gradient_four_ways(degree):
     y, gradient = harmonics.evaluate_with_gradient(POINTS, degree)
     np.testing.assert_allclose(y, oracles.scipy_basis(POINTS, degree), 0, 3e-14)

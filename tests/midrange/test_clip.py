@@ -84,6 +84,7 @@ def test_blockers_that_overlap_count_once():
     check(Polygon(WINDOW, ONE), np.zeros(3), expected, blockers=blockers)
 
 
+@pytest.mark.slow
 def test_blockers_that_share_an_edge_leave_no_gap():
     """A square in two triangles blocks as the square does; one as large as the light, all of it."""
     square = rectangle([0.1, 0.05, 1], [0, 0.5, 0], [0.5, 0, 0])
@@ -112,6 +113,7 @@ def test_blocker_behind_the_light_or_the_point_does_not_block():
     np.testing.assert_allclose(value[0], expected, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_clipped_lights_are_differentiable(rng):
     """Forward as the analytic gradient; reverse in everything, finite also where nothing is cut."""
     corners, blocker = (

@@ -74,6 +74,7 @@ def test_edges_are_arcs_between_texels(resolution):
     assert (np.sum(across * (centers[second] - centers[first]), axis=-1) > 0).all()
 
 
+@pytest.mark.slow
 def test_lights_that_are_partly_hidden():
     """24 random ones at 64²; the paper's form is blind to what moves before a light."""
     rng = np.random.default_rng(2004)
@@ -106,7 +107,9 @@ def relative(a, b):
     return np.linalg.norm(a - b) / np.linalg.norm(b)
 
 
-@pytest.mark.parametrize(("resolution", "limit"), [(64, 0.03), (256, 0.003)])
+@pytest.mark.parametrize(
+    ("resolution", "limit"), [(64, 0.03), pytest.param(256, 0.003, marks=pytest.mark.slow)]
+)
 def test_one_light_that_nothing_hides(resolution, limit):
     """Both forms against quadrature over the light: within 3 % at 64², 0.3 % at 256²."""
     light = rectangle([0.3, -0.2, 2], [0.6, 0.1, 0], [0, -0.5, 0.2])

@@ -93,8 +93,7 @@ def test_make_expansion(rng):
     assert make_expansion(p, c).order == 0
 
 
-@pytest.mark.parametrize("rule", ["none", "half", "full"])
-@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize(("rule", "count"), [("none", 4), ("half", 10), ("full", 1), ("full", 20)])
 def test_rules_sample_by_sample(rng, rule, count):
     grid = Grid(-np.ones(3), np.ones(3), (2, 3, 3))
     x = rng.uniform(-1.2, 1.2, (7, 3))

@@ -72,6 +72,7 @@ def _error(points, x):
     return prediction.error(list(range(len(points))))[0]
 
 
+@pytest.mark.slow
 def test_greedy_meets_its_target_with_few(rng):
     x = rng.uniform(-0.5, 0.5, (400, 3))
     options = {"method": "greedy", "evaluate": _light, "candidates": 30, "probes": 100}

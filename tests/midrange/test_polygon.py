@@ -123,6 +123,7 @@ def test_polygon_has_one_side_or_two(rng):
     np.testing.assert_array_equal(one[0][0], both[0][0])
 
 
+@pytest.mark.slow
 def test_polygon_where_there_is_no_light_to_speak_of():
     """In the plane, on an edge, at a corner, on an edge's line: finite, zero, zero slopes."""
     polygon = Polygon(rectangle([0, 0, 1], [0, 1, 0], [1, 0, 0]), RADIANCE)

@@ -28,7 +28,7 @@ def cap_quadrature(center, radius, point, degree):
     return weights @ np.asarray(harmonics.evaluate(directions, degree))
 
 
-@pytest.mark.parametrize("degree", [0, 1, 4, 10])
+@pytest.mark.parametrize("degree", [0, 10])
 def test_sphere_is_the_integral_over_its_cap(rng, degree):
     center, radius = rng.normal(size=3), 0.7
     points = center + np.array([[0.1, 0.2, -0.8], [3, 1, 0], [-50, 20, 10]])

@@ -48,7 +48,7 @@ def test_terms_are_the_texel_form_s_derivatives(rng):
     assert start == terms.shape[-1] == 10
 
 
-@pytest.mark.parametrize("order", [0, 1, 2, 3])
+@pytest.mark.parametrize("order", [1, 3])
 def test_error_falls_with_the_offset_s_power(rng, order):
     cube = random_cube(rng)
     expansion = taylor(cube, DEGREE, order)
@@ -128,6 +128,7 @@ def test_jit_vmap_and_float32(rng):
     np.testing.assert_allclose(taylor(single, 2, 2).terms, terms, atol=1e-5 * np.abs(terms).max())
 
 
+@pytest.mark.slow
 def test_derivatives_in_the_whole_cube(rng):
     cube = random_cube(rng, resolution=1, sky=0.0)
 

@@ -12,8 +12,6 @@ from scipy.interpolate import RegularGridInterpolator
 from jaxsh.midrange._grid import Grid, grid_around
 from jaxsh.midrange._weights import inverse_distance_weights, moving_least_squares_weights
 
-DTYPES = [np.float32, np.float64]
-
 
 @pytest.mark.parametrize("exponent", [1.0, 4.0, 5.5])
 def test_inverse_distances_are_eq_16(rng, exponent):
@@ -25,8 +23,10 @@ def test_inverse_distances_are_eq_16(rng, exponent):
     assert weights.samples == 4
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("make", [inverse_distance_weights, moving_least_squares_weights])
+@pytest.mark.parametrize(
+    ("make", "dtype"),
+    [(inverse_distance_weights, np.float64), (moving_least_squares_weights, np.float32)],
+)
 def test_weights_at_and_near_samples(rng, make, dtype):
     p = rng.normal(size=(6, 3)).astype(dtype)
     x = np.concatenate([p, p + dtype(1e-7), p * dtype(1e4)])
@@ -123,6 +123,7 @@ def test_grid_interpolates_in_cells(rng):
         assert len(set(np.asarray(cells.cell)[row[row < 200]])) <= 1
 
 
+@pytest.mark.slow
 def test_weights_jit_and_slopes(rng):
     x, p = jnp.asarray(rng.uniform(0.1, 0.9, (5, 3))), jnp.asarray(rng.normal(size=(6, 3)))
     grid = Grid(np.zeros(3), np.ones(3), (3, 2, 2))

@@ -52,6 +52,7 @@ def test_edges_of_the_range(fitted):
             assert relative_error(fitted(sun, haze), exact(sun, haze)) < 1e-6
 
 
+@pytest.mark.slow
 def test_plain_series_too(rng):
     options = OPTIONS | {"terms": (12, 3), "solver": "qr"}
     plain = sky.fit(haze_sky, HAZE, **options, parity=False)
@@ -86,6 +87,7 @@ def test_no_convergence_is_said():
     assert quiet.solution.result == optx.RESULTS.nonlinear_max_steps_reached
 
 
+@pytest.mark.slow
 def test_lawson_lowers_the_worst(rng):
     def glow(view, sun):
         return jnp.exp(2 * (view @ sun))[:, None]
@@ -100,6 +102,7 @@ def test_lawson_lowers_the_worst(rng):
     assert worst[1] < 0.95 * worst[0]
 
 
+@pytest.mark.slow
 def test_prefactor_mix_and_weight(rng):
     """What a prefactor takes out need not be fitted."""
 
@@ -120,6 +123,7 @@ def test_prefactor_mix_and_weight(rng):
     assert relative_error(mixed(sun, haze), expected) < 1e-7
 
 
+@pytest.mark.slow
 def test_any_number_of_parameters(rng):
     def coloured(view, sun, low, high):
         return low + high * (view @ sun)[:, None] ** 2
@@ -184,6 +188,7 @@ def test_derivatives_are_those_of_the_projection(fitted):
         np.testing.assert_allclose(found[1], slopes[..., 3], 0, 1e-5)
 
 
+@pytest.mark.slow
 def test_second_derivatives(fitted):
     """Across the zenith, where the height's square changes from a series to an arctangent."""
     slope = jax.jit(jax.vmap(jax.grad(lambda sun: fitted(sun, 1.7).sum())))

@@ -38,6 +38,7 @@ def slow_equation_1(table, theta, tau):
     return c
 
 
+@pytest.mark.slow
 def test_how_good_the_papers_polynomial_is(full):
     """The paper says less than 0.005 % up to 5 bands. Weights are fitted one by one."""
     elevation, turbidity = np.linspace(0, 90, 14)[:, None], np.linspace(2.5, 6, 12)[None]

@@ -83,6 +83,7 @@ def test_readings_of_the_smallest_luminance(rng, unchecked):
         sky.smallest_luminance(sun, turbidity, reading="mean")
 
 
+@pytest.mark.slow
 def test_the_table_is_what_the_script_makes():
     """Rows are fitted one by one, so that those of degree 1 are enough."""
     made = make_table.make("small", degree=1, solver="qr")

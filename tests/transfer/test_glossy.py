@@ -198,7 +198,7 @@ def test_where_there_is_no_direction_the_value_is_finite(rng):
     np.testing.assert_array_equal(behind, shade_glossy(light, turned, EYE, MATERIAL)[:2])
 
 
-@pytest.mark.parametrize("form", ["transfer", "sampled", "light product"])
+@pytest.mark.parametrize("form", ["sampled", "light product"])
 def test_glossy_derivatives(rng, form):
     made, light = surface(rng, degree=2, count=3), jnp.asarray(rng.normal(size=(3, 9)))
 
@@ -259,7 +259,7 @@ def test_beyond_lebedev_s_rules_there_is_another():
 
 
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float32, 6e-6), (np.float64, 2e-14)])
-@pytest.mark.parametrize("degree", [0, 1, 5, 20])
+@pytest.mark.parametrize("degree", [0, 20])
 def test_the_lobe_s_polynomial(dtype, tolerance, degree):
     exponents, t = np.array([1.0, 32.0, 1000.0]), np.linspace(-1, 1, 1001)
     norms = np.sqrt((2 * np.arange(degree + 1) + 1) / (4 * np.pi))
