@@ -17,8 +17,9 @@ ALBEDO = 0.6
 def baked():
     """Of about 300 vertices, shadows included, in float64."""
     baked = transfer.bake(geometry.knot(300), 2, directions=256, progress=False)
-    cast = lambda x: x.astype(jnp.float64)  # noqa: E731
-    return eqx.tree_at(lambda t: (t.coefficients, t.positions), baked, replace_fn=cast)
+    return eqx.tree_at(
+        lambda t: (t.coefficients, t.positions), baked, replace_fn=lambda x: x.astype(jnp.float64)
+    )
 
 
 def rectangle(center, toward, width, height, radiance):

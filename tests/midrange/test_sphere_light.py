@@ -44,7 +44,10 @@ def test_sphere_is_the_integral_over_its_cap(rng, degree):
 def test_sphere_s_gradient_is_its_derivative(rng):
     sphere = Sphere(rng.normal(size=3), 0.7, RADIANCE)
     point = sphere.center + jnp.asarray([0.5, 0.6, -0.8])
-    light = lambda s, p: sphere_harmonics(s, p, 4)  # noqa: E731
+
+    def light(sphere, point):
+        return sphere_harmonics(sphere, point, 4)
+
     _, gradient = sphere_harmonics_with_gradient(sphere, point, 4)
     by_sphere, by_point = jax.jacrev(light, (0, 1))(sphere, point)
     np.testing.assert_allclose(by_point, gradient, rtol=0, atol=1e-13)
