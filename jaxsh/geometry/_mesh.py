@@ -49,9 +49,10 @@ def build(vertices: np.ndarray, faces: np.ndarray, *, source: str, corners: bool
     if found:
         warnings.warn(f"{source}: {', '.join(found)}", UserWarning, stacklevel=3)
     points, triangles = jnp.asarray(vertices), jnp.asarray(faces)
-    return Mesh(points, triangles, jax.jit(vertex_normals)(points, triangles))
+    return Mesh(points, triangles, vertex_normals(points, triangles))
 
 
+@jax.jit
 def vertex_normals(vertices: Float[Array, "v 3"], faces: Int[Array, "f 3"]) -> Float[Array, "v 3"]:
     """Unit vertex normals: the mean of the normals of the faces around, weighted by their area.
 

@@ -25,7 +25,7 @@ def gaunt(degree: int) -> Float[Array, "k k k"]:
 
     Exact zeros are zero. Needs 8 K³ bytes: 14 MB at degree 10, 60 MB at 13.
     """
-    return jnp.asarray(_gaunt(check_degree(degree)))
+    return jnp.asarray(_gaunt(check_degree(degree)), jnp.result_type(float))
 
 
 def product(

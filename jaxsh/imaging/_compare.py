@@ -1,5 +1,6 @@
 """How far one picture is from another."""
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
@@ -16,6 +17,11 @@ def psnr(
     pictures are equal there, and NaN where the mask is empty. Differentiable in both pictures,
     with zero gradient where they are equal.
     """
+    return _psnr(image, reference, mask, peak)
+
+
+@jax.jit
+def _psnr(image, reference, mask, peak) -> Float[Array, ""]:
     squared = jnp.mean((image - reference) ** 2, axis=-1)
     error = jnp.mean(squared, where=mask)
     differs = error != 0

@@ -1,8 +1,10 @@
 """From linear radiance to what a screen shows."""
 
+import functools
 import math
 from typing import Literal
 
+import jax
 import jax.numpy as jnp
 from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
@@ -10,6 +12,7 @@ from jaxtyping import Array, Bool, Float
 _LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec. 709
 
 
+@jax.jit
 def srgb_encode(linear: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     """Linear light in [0, 1] to sRGB's signal (IEC 61966-2-1), the exact two-part curve.
 
@@ -21,6 +24,7 @@ def srgb_encode(linear: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     return jnp.where(low, 12.92 * linear, 1.055 * power - 0.055)
 
 
+@jax.jit
 def srgb_decode(signal: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     """The inverse of `srgb_encode`: sRGB's signal to linear light."""
     low = signal <= 0.04045
@@ -47,21 +51,27 @@ def tone_map(
     Raises `ValueError` for an unknown curve, a last axis that is not R, G, B, and, where it is
     concrete, a white that is not above 0.
     """
+    if curve not in ("clip", "reinhard"):
+        raise ValueError(f'curve must be "clip" or "reinhard", got {curve!r}')
+    if curve == "reinhard" and image.shape[-1:] != (3,):
+        raise ValueError(f"a luminance needs R, G, B in the last axis, got shape {image.shape}")
+    if curve == "reinhard" and not isinstance(white, Tracer) and not white > 0:
+        raise ValueError(f"white must be above 0, got {white}")
+    return _tone_map(image, exposure, white, curve)
+
+
+# One program for a picture, not one for each step.
+@functools.partial(jax.jit, static_argnums=3)
+def _tone_map(image, exposure, white, curve: str) -> Float[Array, "*shape"]:
     exposed = image * jnp.asarray(exposure, image.dtype)
     if curve == "reinhard":
         exposed = _reinhard(exposed, white)
-    elif curve != "clip":
-        raise ValueError(f'curve must be "clip" or "reinhard", got {curve!r}')
     return srgb_encode(jnp.clip(exposed, 0, 1))
 
 
 def _reinhard(
     image: Float[Array, "*shape"], white: float | Float[Array, ""]
 ) -> Float[Array, "*shape"]:
-    if image.shape[-1:] != (3,):
-        raise ValueError(f"a luminance needs R, G, B in the last axis, got shape {image.shape}")
-    if not isinstance(white, Tracer) and not white > 0:
-        raise ValueError(f"white must be above 0, got {white}")
     image = jnp.maximum(image, 0)
     weights = jnp.asarray(_LUMINANCE, image.dtype)
     luminance = jnp.einsum("...c,c->...", image, weights, precision="highest")[..., None]
@@ -81,6 +91,11 @@ def auto_exposure(
     """
     if not 0 <= percentile <= 100:
         raise ValueError(f"percentile must be between 0 and 100, got {percentile}")
+    return _auto_exposure(image, mask, percentile)
+
+
+@functools.partial(jax.jit, static_argnums=2)
+def _auto_exposure(image, mask, percentile: float) -> Float[Array, ""]:
     brightest = jnp.max(image, axis=-1)
     if mask is not None:
         brightest = jnp.where(mask, brightest, jnp.nan)

@@ -1,6 +1,7 @@
 """Which face a pixel sees, and colours from vertices to pixels."""
 
 import dataclasses
+import functools
 import operator
 
 import equinox as eqx
@@ -36,7 +37,7 @@ class Raster(eqx.Module):
     @property
     def alpha(self) -> Float[Array, "h w"]:
         """The share of a pixel's samples that are on the object; float32."""
-        return _resolve((self.face >= 0).astype(jnp.float32)[..., None], self.samples)[..., 0]
+        return _alpha(self.face, self.samples)
 
     @property
     def mask(self) -> Bool[Array, "h w"]:
@@ -92,6 +93,11 @@ def interpolate(
     if behind.ndim > 1 and behind.shape != shape:
         raise ValueError(f"expected a background {shape}, got shape {behind.shape}")
     return _interpolate(raster, faces, values, behind)
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _alpha(face: Int[Array, "hn wn"], samples: int) -> Float[Array, "h w"]:
+    return _resolve((face >= 0).astype(jnp.float32)[..., None], samples)[..., 0]
 
 
 @jax.jit

@@ -1,5 +1,6 @@
 """A grid of samples, and the cells between them."""
 
+import functools
 import itertools
 import math
 import operator
@@ -70,19 +71,11 @@ class Grid(eqx.Module):
         positions = check_positions(positions)
         if positions.ndim != 2:
             raise ValueError(f"expected positions (V, 3), got shape {positions.shape}")
-        spans = np.array(self.shape, np.int32) - 1
         lower, upper = self.lower.astype(positions.dtype), self.upper.astype(positions.dtype)
-        scaled = (positions - lower[None]) / (upper - lower)[None]
-        scaled = scaled * jnp.asarray(spans, positions.dtype)[None]
-        whole = jnp.clip(jnp.floor(scaled).astype(jnp.int32), 0, spans[None] - 1)
-        share = scaled - whole.astype(positions.dtype)
-        sides = jnp.stack([1 - share, share])
-        x, y, z = (sides[_CORNERS[:, axis], :, axis] for axis in range(3))
-        values = (x * y * z).T
+        values, cell = _trilinear(positions, lower, upper, self.shape)
         samples = self._samples()
         if len(samples) == 1:
             return Weights(values)
-        cell = (whole[:, 0] * spans[1] + whole[:, 1]) * spans[2] + whole[:, 2]
         rows, place = _sorted(cell, len(samples))
         return Weights(values, Cells(jnp.asarray(samples), cell, rows, place, self.size))
 
@@ -117,7 +110,26 @@ def grid_around(positions: Float[ArrayLike, "v 3"], shape: tuple[int, int, int])
     return Grid(middle - half, middle + half, shape)
 
 
-@jax.jit(static_argnums=1)
+@functools.partial(jax.jit, static_argnums=3)
+def _trilinear(
+    positions: Float[Array, "v 3"],
+    lower: Float[Array, " 3"],
+    upper: Float[Array, " 3"],
+    shape: tuple[int, int, int],
+) -> tuple[Float[Array, "v 8"], Int[Array, " v"]]:
+    """Weights of the corners of the cell that each position is in, and that cell."""
+    spans = np.array(shape, np.int32) - 1
+    scaled = (positions - lower[None]) / (upper - lower)[None]
+    scaled = scaled * jnp.asarray(spans, positions.dtype)[None]
+    whole = jnp.clip(jnp.floor(scaled).astype(jnp.int32), 0, spans[None] - 1)
+    share = scaled - whole.astype(positions.dtype)
+    sides = jnp.stack([1 - share, share])
+    x, y, z = (sides[_CORNERS[:, axis], :, axis] for axis in range(3))
+    cell = (whole[:, 0] * spans[1] + whole[:, 1]) * spans[2] + whole[:, 2]
+    return (x * y * z).T, cell
+
+
+@functools.partial(jax.jit, static_argnums=1)
 def _sorted(
     cell: Int[Array, " v"], count: int
 ) -> tuple[Int[Array, "blocks size"], Int[Array, " v"]]:

@@ -38,12 +38,12 @@ def _tables(resolution: int, degree: int, dtype) -> Tables:
     with jax.ensure_compile_time_eval():
         cube, part = texels(resolution), (slice(None), 0, slice(_rows(resolution) * resolution))
         shape = 3, 2, resolution**2
-        vectors, weights = (
-            cube.directions.reshape(*shape, 3)[part],
-            cube.weights.reshape(shape)[part],
-        )
-        table = (evaluate(vectors, degree, axis=0) * weights[None]).astype(dtype)
-        return tuple(table[each.rows, each.axis] for each in _parities(resolution, degree))
+        # By NumPy, which has nothing to compile.
+        vectors = np.asarray(cube.directions).reshape(*shape, 3)[part]
+        weights = np.asarray(cube.weights).reshape(shape)[part]
+        table = np.asarray(evaluate(vectors, degree, axis=0)) * weights
+        parts = [table[each.rows, each.axis] for each in _parities(resolution, degree)]
+        return tuple(jnp.asarray(part, dtype) for part in parts)
 
 
 def moments(

@@ -73,13 +73,15 @@ def inverse_distance_weights(
 
     Raises `ValueError` for shapes that do not fit and an exponent that is not positive.
     """
-    offsets, half = _offsets(positions, points), _check_exponent(exponent) / 2
-    return Weights(_shepard(offsets, half))
+    positions, points = _check_places(positions, points)
+    return Weights(_shepard(positions, points, _check_exponent(exponent) / 2))
 
 
-@functools.partial(jax.jit, static_argnums=1)
-def _shepard(offsets: Rows, half: float) -> Float[Array, "v s"]:
-    squared = _squared_length(offsets)
+@functools.partial(jax.jit, static_argnums=2)
+def _shepard(
+    positions: Float[Array, "v 3"], points: Float[Array, "s 3"], half: float
+) -> Float[Array, "v s"]:
+    squared = _squared_length(_offsets(positions, points))
     nearest = _nearest(squared)
     # The nearest sample's power is the constant one. As a quotient of distances its derivative
     # would be what rounding leaves of two that cancel and grow without bound towards the sample.
@@ -111,12 +113,15 @@ def moving_least_squares_weights(
     outside the samples' hull. Differentiable in positions and points, forward and reverse, at a
     sample's point too; whether points lie in a plane is taken as given.
     """
-    offsets, half = _offsets(positions, points), _check_exponent(exponent) / 2
-    return Weights(_least_squares(offsets, as_float(points).astype(offsets[0].dtype), half))
+    positions, points = _check_places(positions, points)
+    return Weights(_least_squares(positions, points, _check_exponent(exponent) / 2))
 
 
 @functools.partial(jax.jit, static_argnums=2)
-def _least_squares(offsets: Rows, points: Float[Array, "s 3"], half: float) -> Float[Array, "v s"]:
+def _least_squares(
+    positions: Float[Array, "v 3"], points: Float[Array, "s 3"], half: float
+) -> Float[Array, "v s"]:
+    offsets = _offsets(positions, points)
     squared = _squared_length(offsets)
     nearest = _nearest(squared)
     # Around the nearest sample, f_j = p_j - p_near and e_j = f_j + e_near, nothing cancels: its
@@ -145,15 +150,19 @@ def _least_squares(offsets: Rows, points: Float[Array, "s 3"], half: float) -> F
     return jnp.where(nearest, 1 - _total(weights)[None], weights).T
 
 
-def _offsets(positions, points) -> Rows:
-    """x, y, z of each position minus each point; the positions, of which there are many, last."""
+def _check_places(positions, points) -> tuple[Float[Array, "v 3"], Float[Array, "s 3"]]:
+    """Both in the dtype of the positions."""
     positions, points = check_positions(positions), as_float(points)
     if positions.ndim != 2 or points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
         raise ValueError(
             f"expected positions (V, 3) and at least one point (S, 3), got shapes "
             f"{positions.shape} and {points.shape}"
         )
-    points = points.astype(positions.dtype)
+    return positions, points.astype(positions.dtype)
+
+
+def _offsets(positions: Float[Array, "v 3"], points: Float[Array, "s 3"]) -> Rows:
+    """x, y, z of each position minus each point; the positions, of which there are many, last."""
     x, y, z = (positions[:, axis][None] - points[:, axis][:, None] for axis in range(3))
     return x, y, z
 

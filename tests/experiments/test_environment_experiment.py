@@ -14,7 +14,7 @@ from jaxsh import sphere
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("results")
-    options = ["--out", str(out), "--degrees", "1", "2", "6", "--size", "48", "--no-progress"]
+    options = ["--out", str(out), "--degrees", "2", "6", "--size", "48", "--no-progress"]
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("JAXSH_DATA", raising=False)
         assert main(["run", "environment", *options]) == 0
@@ -24,10 +24,10 @@ def folder(tmp_path_factory):
 def test_error_falls_with_degree(folder):
     rows = json.loads((folder / "metrics.json").read_text())
     plain = [row for row in rows if row["window"] == "none"]
-    assert [row["degree"] for row in plain] == [1, 2, 6]
+    assert [row["degree"] for row in plain] == [2, 6]
     for better in ("mean_error", "max_error", "relative_error"):
-        assert plain[0][better] > 2 * plain[1][better] > 4 * plain[2][better] > 0
-    assert plain[0]["psnr"] + 6 < plain[1]["psnr"] < plain[2]["psnr"] - 6
+        assert plain[0][better] > 2 * plain[1][better] > 0
+    assert plain[0]["psnr"] + 6 < plain[1]["psnr"]
     assert all(row["reference_rounding"] < 5e-6 for row in rows)  # measured 5e-7
 
 

@@ -73,7 +73,7 @@ def test_recovers_two_lights_from_the_better_guess(baked, rng):
         rectangle([0.3, 1.6, -1.1], [0, 0, 0], 0.6, 0.6, white).polygon,
         rectangle([-0.2, 1.2, 1.4], [0, 0, 0], 0.6, 0.6, white).polygon,
     )
-    found = inverse.fit_polygons(observed, baked, ALBEDO, [far, near], max_steps=60)
+    found = inverse.fit_polygons(observed, baked, ALBEDO, [far, near], max_steps=30)
     assert found.converged
     assert found.statistics.starts == 2
     assert found.statistics.residual < 1e-6
@@ -84,7 +84,7 @@ def test_recovers_two_lights_from_the_better_guess(baked, rng):
 
     noise = 0.01 * float(observed.mean())
     noisy = observed + noise * rng.normal(size=observed.shape)
-    found = inverse.fit_polygons(noisy, baked, ALBEDO, [far, near], max_steps=60)
+    found = inverse.fit_polygons(noisy, baked, ALBEDO, [far, near], max_steps=30)
     for light, truth, deviation in zip(
         found.value, (LAMP, PANEL), found.confidence.deviation, strict=True
     ):

@@ -89,7 +89,9 @@ def _solid_harmonics(l):
 
 
 def _monomials(omega, powers):
-    return np.prod(omega[:, None] ** powers, axis=-1)
+    table = omega[:, :, None] ** np.arange(powers.max() + 1)
+    x, y, z = (table[:, axis, powers[:, axis]] for axis in range(3))
+    return x * y * z
 
 
 def rectangle(center, u, v):

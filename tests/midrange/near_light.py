@@ -1,5 +1,6 @@
 """A small light whose coefficients are differentiated by JAX, and a mesh's transfer for it."""
 
+import functools
 import itertools
 from math import factorial, prod
 
@@ -22,6 +23,12 @@ def point_lights(position, degree):
 
 def expand(points, degree, order=1):
     """Expansions around points (n, 3), by nested forward derivatives."""
+    points = jnp.asarray(points)
+    return Expansion(points, _terms(points, degree, order))
+
+
+@functools.partial(jax.jit, static_argnums=(1, 2))
+def _terms(points, degree, order):
     derivatives = [lambda p: point_lights(p, degree)]
     for _ in range(order):
         derivatives.append(jax.jacfwd(derivatives[-1]))
@@ -35,8 +42,7 @@ def expand(points, degree, order=1):
                 columns.append(tensor[(..., *axes)] / repeated)
         return jnp.stack(columns, axis=-1)
 
-    points = jnp.asarray(points)
-    return Expansion(points, jax.jit(jax.vmap(terms))(points))
+    return jax.vmap(terms)(points)
 
 
 def random_transfer(rng, count, degree, dtype=np.float64):

@@ -18,6 +18,7 @@ from jaxsh.midrange._sphere import Sphere
 from jaxsh.midrange._taylor import project_cube, taylor
 from jaxsh.sphere import project_lat_long, reconstruct_lat_long
 
+# Cubes are projected at 64² texels and degree 2 throughout: one program of each form.
 RED, WHITE = np.array([1.0, 0, 0]), np.array([1.0, 1, 1])
 STAR = np.array([[0, 0, 0], [1, -0.1, 0], [0.4, 0.3, 0], [0.9, 1, 0], [-0.2, 0.8, 0.0]])
 LIGHT = rectangle([0.3, -0.2, 2], [0.6, 0.1, 0], [0, -0.5, 0.2])
@@ -125,7 +126,7 @@ def test_an_environment_alone_is_its_projection(rng):
     """Within the cube's error, and with no gradient."""
     coefficients = rng.normal(size=(3, 9))
     picture = reconstruct_lat_long(coefficients, 64, 128)
-    cube = capture(Scene([], environment=picture), np.zeros(3), 32)
+    cube = capture(Scene([], environment=picture), np.zeros(3), 64)
     c, gradient = project_cube_with_gradient(cube, 2)
     np.testing.assert_allclose(c, project_lat_long(picture, 2), atol=3e-3)
     np.testing.assert_array_equal(gradient, 0)
@@ -141,16 +142,16 @@ def test_a_small_sun_of_the_environment_is_not_missed():
 
 
 def test_an_empty_scene_is_black_and_finite():
-    for cube in (capture(Scene([]), np.zeros(3), 4), capture_analytic([], jnp.zeros(3), 4)):
+    for cube in (capture(Scene([]), np.zeros(3), 4), capture_analytic([], jnp.zeros(3), 64)):
         assert not np.asarray(taylor(cube, 2, 1).terms).any()
 
 
 def test_a_point_on_the_light_s_plane_sees_nothing_of_it():
     light = Polygon(rectangle([2, 0, 0], [0.5, 0, 0], [0, 0.5, 0]), WHITE)
     for cube in (
-        capture(Scene([light]), np.zeros(3), 16),
-        capture_analytic([light], jnp.zeros(3), 16),
-        capture(Scene([light]), np.array([2.0, 0, 0]), 16),
+        capture(Scene([light]), np.zeros(3), 64),
+        capture_analytic([light], jnp.zeros(3), 64),
+        capture(Scene([light]), np.array([2.0, 0, 0]), 64),
     ):
         assert np.isfinite(taylor(cube, 2, 1).terms).all()
         assert np.isfinite(project_cube_with_gradient(cube, 2, gradient="edges")[1]).all()
@@ -164,7 +165,7 @@ def test_translation_and_rotation():
     def seen(move, point):
         polygon = Polygon(move(LIGHT), WHITE)
         ball = Sphere(move(np.array([-1, 0.2, 0.5])), np.array(0.25), RED)
-        return taylor(capture(Scene([polygon], [ball]), point, 32), 3, 1)
+        return taylor(capture(Scene([polygon], [ball]), point, 64), 2, 1)
 
     here = seen(lambda x: x, point)
     there = seen(lambda x: x + away, point + away)
@@ -180,7 +181,7 @@ def test_translation_and_rotation():
 def test_a_far_light_is_a_distant_one():
     """1/r of what it sends: a gradient that falls as the inverse of the distance."""
     terms = [
-        taylor(capture(Scene([Polygon(LIGHT * size, WHITE)]), np.zeros(3), 32), 2, 1)
+        taylor(capture(Scene([Polygon(LIGHT * size, WHITE)]), np.zeros(3), 64), 2, 1)
         for size in (1.0, 100.0)
     ]
     np.testing.assert_allclose(terms[1].coefficients, terms[0].coefficients, atol=1e-12)

@@ -1,7 +1,6 @@
 """The projection of a radiance cube against the paper's loop over texels, written out."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from cubes import random_cube
@@ -37,23 +36,27 @@ def by_the_paper(cube, degree):
 @pytest.mark.parametrize(("dtype", "rtol"), [(np.float64, 1e-13), (np.float32, 2e-6)])
 def test_equals_the_paper_s_loop(rng, dtype, rtol):
     cube = random_cube(rng, dtype=dtype)
-    exact = by_the_paper(cube, 4)
-    got = project_cube_with_gradient(cube, 4)
+    exact = by_the_paper(cube, 3)
+    got = project_cube_with_gradient(cube, 3)
     for a, b in zip(got, exact, strict=True):
         assert a.dtype == dtype
         np.testing.assert_allclose(a, b, atol=rtol * np.abs(b).max(), rtol=0)
-    np.testing.assert_allclose(project_cube(cube, 4), exact[0], atol=rtol * np.abs(exact[0]).max())
+    np.testing.assert_allclose(project_cube(cube, 3), exact[0], atol=rtol * np.abs(exact[0]).max())
 
 
 def test_is_linear_in_the_radiance(rng):
     cube = random_cube(rng, resolution=1)
-    jacobian = jax.jacrev(
-        lambda radiance: project_cube_with_gradient(
+
+    @jax.jit
+    @jax.jacrev
+    def jacobians(radiance):
+        return project_cube_with_gradient(
             RadianceCube(radiance, cube.distance, cube.offset, cube.normal, cube.point), 1
         )
-    )(cube.radiance)
-    for value, slope in zip(project_cube_with_gradient(cube, 1), jacobian, strict=True):
-        summed = jnp.tensordot(slope, cube.radiance, 2)
+
+    values = project_cube_with_gradient(cube, 1)
+    for value, slope in zip(values, jacobians(cube.radiance), strict=True):
+        summed = np.tensordot(slope, cube.radiance, 2)
         np.testing.assert_allclose(summed, value, atol=1e-12)
 
 

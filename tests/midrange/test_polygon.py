@@ -39,11 +39,11 @@ def before(vertices, rng, distance):
 @pytest.mark.parametrize("degree", [0, 10])
 def test_polygon_is_its_surface_integral(rng, degree):
     vertices = concave(rng)
-    points = np.stack([before(vertices, rng, d) for d in (0.7, 1, 2, 5, 30)])
+    points = np.stack([before(vertices, rng, d) for d in (0.7, 2, 30)])
     polygon = Polygon(vertices, RADIANCE)
     value, gradient = polygon_harmonics_with_gradient(polygon, points, degree)
     alone = polygon_harmonics(polygon, points, degree)
-    assert value.shape == (5, 3, (degree + 1) ** 2)
+    assert value.shape == (3, 3, (degree + 1) ** 2)
     assert gradient.shape == (*value.shape, 3)
     for i, point in enumerate(points):
         c, slope = surface_quadrature(vertices, RADIANCE, point, degree)
@@ -146,26 +146,33 @@ def test_polygon_is_differentiable_both_ways(rng):
     point = jnp.asarray(before(vertices, rng, 0.8))
     polygon = Polygon(vertices, RADIANCE)
     _, gradient = polygon_harmonics_with_gradient(polygon, point, 3)
-    forward = jax.jacfwd(lambda p: polygon_harmonics(polygon, p, 3))(point)
+    forward = jax.jit(jax.jacfwd(lambda p: polygon_harmonics(polygon, p, 3)))(point)
     np.testing.assert_allclose(forward, gradient, rtol=0, atol=1e-13)
 
     probe = jnp.asarray(rng.normal(size=(3, 16)))
     corners = jnp.asarray(vertices)
     in_plane = jnp.asarray(rng.normal(size=(5, 2)) @ (vertices[2:4] - vertices[1]))
 
-    @jax.jit
     def light(corners, point):
         lit = eqx.tree_at(lambda p: p.vertices, polygon, corners)
         return jnp.sum(probe * polygon_harmonics(lit, point, 3))
 
-    slopes = jax.jit(jax.grad(light, (0, 1)))(corners, point)
+    @jax.jit
+    def derivatives(corners, point):
+        def slope(point):
+            value, slopes = jax.value_and_grad(light, (0, 1))(corners, point)
+            return slopes[1], (value, slopes)
+
+        second, (value, slopes) = jax.jacfwd(slope, has_aux=True)(point)
+        return value, slopes, second
+
+    _, slopes, second = derivatives(corners, point)
     expected = jnp.sum(probe[..., None] * gradient, axis=(0, 1))
     np.testing.assert_allclose(slopes[1], expected, rtol=0, atol=1e-12)
     np.testing.assert_allclose(jnp.sum(slopes[0], axis=0), -expected, rtol=0, atol=1e-12)
     h = 1e-5
-    difference = (light(corners + h * in_plane, point) - light(corners - h * in_plane, point)) / 2
-    np.testing.assert_allclose(jnp.sum(slopes[0] * in_plane), difference / h, rtol=1e-7)
-    second = jax.jit(jax.jacfwd(jax.grad(light, 1), 1))(corners, point)
+    more, less = (derivatives(corners + step * in_plane, point)[0] for step in (h, -h))
+    np.testing.assert_allclose(jnp.sum(slopes[0] * in_plane), (more - less) / (2 * h), rtol=1e-7)
     np.testing.assert_allclose(second, second.T, rtol=0, atol=1e-11)
     assert jnp.abs(second).max() > 0.1
 
@@ -176,16 +183,17 @@ def test_polygon_in_float32_and_in_batches(rng):
     distances = np.geomspace(0.7, 30, 1030)
     points = np.stack([before(vertices, rng, d) for d in distances])
     polygon = Polygon(vertices, RADIANCE)
-    exact = polygon_harmonics(polygon, points, 4)
+    shaped = np.asarray(polygon_harmonics(polygon, points.reshape(103, 10, 3), 4))
+    assert shaped.shape == (103, 10, 3, 25)
+    exact = shaped.reshape(1030, 3, 25)
     c, slope = polygon_harmonics_with_gradient(polygon, points.astype(np.float32), 4)
     assert c.dtype == slope.dtype == jnp.float32
     scale = np.abs(exact).max(axis=(1, 2)) * np.maximum(distances, 1)
-    worst = (np.abs(np.asarray(c) - np.asarray(exact)).max(axis=(1, 2)) / scale).max()
+    worst = (np.abs(np.asarray(c) - exact).max(axis=(1, 2)) / scale).max()
     assert worst < 2e-6
-    shaped = polygon_harmonics(polygon, points.reshape(103, 10, 3), 4)
-    np.testing.assert_allclose(shaped.reshape(exact.shape), exact, rtol=0, atol=1e-14)
-    single = jax.vmap(lambda p: polygon_harmonics(polygon, p, 4))(jnp.asarray(points[:3]))
-    np.testing.assert_allclose(single, exact[:3], rtol=0, atol=1e-14)
+    chosen = [0, 500, 1029]  # of both blocks
+    single = jax.jit(jax.vmap(lambda p: polygon_harmonics(polygon, p, 4)))(points[chosen])
+    np.testing.assert_allclose(single, exact[chosen], rtol=0, atol=1e-14)
     assert polygon_harmonics(polygon, np.zeros((0, 3)), 4).shape == (0, 3, 25)
 
 

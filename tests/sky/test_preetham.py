@@ -151,7 +151,7 @@ POINTS = {
 }
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 def test_derivatives_are_finite_everywhere(dtype):
     view, sun = (jnp.asarray(v, dtype) for v in map(np.stack, zip(*POINTS.values(), strict=True)))
     turbidity = jnp.asarray(2.0, dtype)
@@ -178,15 +178,20 @@ def test_derivatives_forward_reverse_and_by_differences(rng):
     radiance = jax.jit(sky.preetham_radiance)
     primals = tuple(jnp.asarray(a) for a in (view, sun, turbidity))
     tangents = tuple(jnp.asarray(rng.normal(size=a.shape)) for a in primals)
-    _, forward = jax.jvp(radiance, primals, tangents)
+    cotangent = rng.normal(size=(6, 3))
+
+    @jax.jit
+    def derivatives(*primals):
+        _, push = jax.linearize(sky.preetham_radiance, *primals)
+        return push(*tangents), jax.linear_transpose(push, *primals)(jnp.asarray(cotangent))
+
+    forward, reverse = jax.tree.map(np.asarray, derivatives(*primals))
     numerical = slope(
         lambda h: radiance(*(p + h * t for p, t in zip(primals, tangents, strict=True))), 1e-4
     )
     np.testing.assert_allclose(forward, numerical, 1e-6, 1e-7)
-    cotangent = jnp.asarray(rng.normal(size=forward.shape))
-    reverse = jax.vjp(radiance, *primals)[1](cotangent)
-    pairing = sum(jnp.sum(r * t) for r, t in zip(reverse, tangents, strict=True))
-    assert pairing == pytest.approx(float(jnp.sum(cotangent * forward)), rel=1e-11)
+    pairing = sum(np.sum(r * np.asarray(t)) for r, t in zip(reverse, tangents, strict=True))
+    assert pairing == pytest.approx(np.sum(cotangent * forward), rel=1e-11)
 
 
 @pytest.mark.parametrize(

@@ -23,10 +23,18 @@ def exponential_coefficients(axis, degree):
     return bands[harmonics.degrees(degree)] * np.asarray(harmonics.evaluate(axis, degree))
 
 
+def basis(directions, degree):
+    """y_i at any number of directions, (N, K), by one program for each degree."""
+    directions, size = np.asarray(directions, np.float64), 512
+    blocks = np.resize(directions, (-(-len(directions) // size), size, 3))
+    parts = [np.asarray(harmonics.evaluate(block, degree)) for block in blocks]
+    return np.concatenate(parts)[: len(directions)]
+
+
 def dense_project(values, quadrature, degree):
     """Evaluate everything, then sum."""
-    basis = np.asarray(harmonics.evaluate(quadrature.directions, degree), np.float64)
-    return np.einsum("...n,n,nk->...k", values, np.asarray(quadrature.weights), basis)
+    weights = np.asarray(quadrature.weights)
+    return np.einsum("...n,n,nk->...k", values, weights, basis(quadrature.directions, degree))
 
 
 def picture(f, height, width):

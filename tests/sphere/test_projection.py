@@ -6,13 +6,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from fields import dense_project, exponential, exponential_coefficients, unit_vectors
+from fields import basis, dense_project, exponential, exponential_coefficients, unit_vectors
 from jax.test_util import check_grads
 
 from jaxsh import harmonics, sphere
 
 
-@pytest.mark.parametrize("count", [1, 2047, 2048, 2049, 5000])
+@pytest.mark.parametrize("count", [1, 2048, 2049, pytest.param(5000, marks=pytest.mark.slow)])
 def test_project_is_the_dense_sum_around_block_boundaries(count, rng):
     """Random weights and directions of any length: nothing cancels."""
     quadrature = sphere.Quadrature(
@@ -23,10 +23,10 @@ def test_project_is_the_dense_sum_around_block_boundaries(count, rng):
     np.testing.assert_allclose(result, dense_project(values, quadrature, 4), 0, 1e-14)
 
 
-@pytest.mark.parametrize("count", [1, 2047, 2048, 2049, 5000])
+@pytest.mark.parametrize("count", [1, 2048, 2049, pytest.param(5000, marks=pytest.mark.slow)])
 def test_reconstruct_is_the_dense_sum_around_block_boundaries(count, rng):
     directions, c = rng.normal(size=(count, 3)), rng.normal(size=(2, 25))
-    expected = c @ np.asarray(harmonics.evaluate(directions, 4)).T
+    expected = c @ basis(directions, 4).T
     np.testing.assert_allclose(sphere.reconstruct(c, directions), expected, 0, 1e-14)
 
 
@@ -47,7 +47,7 @@ def test_project_a_known_function(quadrature, degree, error):
     np.testing.assert_allclose(sphere.project(values, quadrature, degree), expected, 0, error)
 
 
-@pytest.mark.parametrize("degree", [0, 5, 9])
+@pytest.mark.parametrize("degree", [0, 9])
 def test_project_inverts_reconstruct(degree, rng):
     c = rng.normal(size=(3, (degree + 1) ** 2))
     quadrature = sphere.gauss_legendre(2 * degree)

@@ -4,18 +4,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from fields import exponential, unit_vectors
+from fields import basis, exponential, unit_vectors
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jaxsh import harmonics, sphere
+from jaxsh import sphere
 
 
 def basis_integrals(quadrature, degree):
     """Σ_n w_n y_i(ω_n), which is √4π for i = 0 and zero beyond."""
-    return np.asarray(quadrature.weights) @ np.asarray(
-        harmonics.evaluate(quadrature.directions, degree)
-    )
+    return np.asarray(quadrature.weights) @ basis(quadrature.directions, degree)
 
 
 def error_by_degree(quadrature, degree):
@@ -56,9 +54,9 @@ def test_gauss_legendre_is_exact_up_to_its_degree_and_not_beyond(degree):
 
 
 def test_gauss_legendre_projects_degree_onto_degree():
-    basis = np.asarray(harmonics.evaluate(sphere.gauss_legendre(12).directions, 6))
+    y = basis(sphere.gauss_legendre(12).directions, 6)
     weights = np.asarray(sphere.gauss_legendre(12).weights)
-    np.testing.assert_allclose((basis.T * weights) @ basis, np.eye(49), 0, 1e-14)
+    np.testing.assert_allclose((y.T * weights) @ y, np.eye(49), 0, 1e-14)
 
 
 @pytest.mark.parametrize(("height", "width"), [(1, 1), (2, 5), (7, 7), (8, 16), (9, 6), (12, 7)])
