@@ -15,8 +15,8 @@ from jaxtyping import Array, Float
 from jaxsh import adaptive, transfer
 from jaxsh.adaptive._products import lobe_kernel
 from jaxsh.harmonics import product_matrix
+from jaxsh.transfer._layout import in_tiles, out_of_tiles, rows_in_tiles
 from jaxsh.transfer._lobe import reflected
-from jaxsh.transfer._sampled import in_tiles, out_of_tiles, rows_in_tiles
 
 from . import Context
 from ._leekim2014_scenes import Quality, Scene
@@ -25,6 +25,7 @@ Method = Literal["masks", "levels", "two_stage", "probes", "tiles"]
 METHODS: tuple[Method, ...] = get_args(Method)
 FILTERS = "masks", "levels", "two_stage"
 THRESHOLD, DIFFUSE_THRESHOLD = 0.02, 0.01  # the paper's
+STILL = "eye product"
 TURN = 0.05  # of the light from frame to frame, in radians
 
 Light = Float[Array, "3 k"]
@@ -52,6 +53,11 @@ def baselines(scene: Scene) -> dict[str, Way]:
     }
 
 
+def still(scene: Scene) -> dict[str, Way]:
+    """The full computation for an eye that stands still, with all done before that can be."""
+    return {STILL: transfer.eye_product(scene.baked, scene.eye, scene.material)}
+
+
 def adaptive_way(scene: Scene, method: Method, **options: Any) -> Way:
     """A frame by one of the methods, with what it needs made; gives an `AdaptiveResult`."""
     baked: transfer.Transfer | adaptive.StagedTransfer = scene.baked
@@ -67,7 +73,9 @@ def adaptive_way(scene: Scene, method: Method, **options: Any) -> Way:
     elif method == "probes":
         options = {"probes": adaptive.make_probes(scene.baked)} | options
     elif method == "tiles":
-        options = {"tiles": adaptive.make_tiles(scene.baked, scene.eye)} | options
+        exponent = float(scene.material.exponent)
+        made = adaptive.make_tiles(scene.baked, scene.eye, exponent=exponent)
+        options = {"tiles": made} | options
     return lambda light: adaptive.shade(
         light, baked, scene.eye, scene.material, method=method, **options
     )

@@ -4,6 +4,7 @@ Of RGB light of K coefficients: 3K² for the glossy and 3K for the diffuse part.
 """
 
 from ..harmonics import num_coefficients
+from ..transfer._nodes import product_nodes
 
 
 def product_cost(kind: str, start: int, end: int, target: int) -> float:
@@ -13,12 +14,13 @@ def product_cost(kind: str, start: int, end: int, target: int) -> float:
     return 3 * (num_coefficients(end) ** power - before) / full_cost(target)
 
 
-def sum_cost(degree: int, nodes: int, target: int) -> float:
+def sum_cost(degree: int, target: int, nodes: int | None = None) -> float:
     """Of a sum over nodes of light, transfer and lobe at a degree, as `shade_glossy` does it.
 
-    At each node 3 for the cosine, one per band of the lobe, one for the product and 3 for RGB. The
-    diffuse part is counted apart.
+    At each of `nodes`, or of as many as are exact, 3 for the cosine, one per band of the lobe, one
+    for the product and 3 for RGB. The diffuse part is counted apart.
     """
+    nodes = len(product_nodes(degree).directions) if nodes is None else nodes
     return nodes * (8 + degree) / full_cost(target)
 
 

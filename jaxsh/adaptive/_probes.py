@@ -85,7 +85,7 @@ def _shade_probes(light, transfer, eye, material, probes, limits, distant, norma
 
     base_polynomial = lobe_polynomial(material.exponent, probes.base.degree, normalized)
     width = (probes.base.degree + 1) ** 2
-    base, _ = lobe_products(light[:, :width], probes.base, axis, base_polynomial)
+    base = lobe_products(light[:, :width], probes.base, axis, base_polynomial)
     at_probes = everywhere(lambda i: in_full(probes.probes[i]), len(probes.probes))
     rest = at_probes - base[:, probes.probes]
     near = [rest[:, probes.nearest[:, i]] for i in range(NEAREST)]
@@ -102,9 +102,7 @@ def _shade_probes(light, transfer, eye, material, probes, limits, distant, norma
         "probes": jnp.asarray(len(probes.probes) / len(active), light.dtype),
         "specular": jnp.mean(active.astype(light.dtype)),
     }
-    target, few = probes.degree, probes.base
-    once = sum_cost(few.degree, few.samples.shape[1], target) + product_cost(
-        "diffuse", 0, target, target
-    )
-    again = sum_cost(target, probes.samples.shape[1], target)
+    target = probes.degree
+    once = sum_cost(probes.base.degree, target) + product_cost("diffuse", 0, target, target)
+    again = sum_cost(target, target)
     return AdaptiveResult(color, shares, once + again * (shares["probes"] + shares["specular"]))

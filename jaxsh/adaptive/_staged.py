@@ -13,6 +13,7 @@ from ..harmonics._indexing import check_degree
 from ..transfer import SampledTransfer, Transfer, sample
 from ..transfer._lobe import lobe
 from ..transfer._nodes import product_nodes
+from ..transfer._shade import tall_product
 
 
 class StagedTransfer(eqx.Module):
@@ -78,7 +79,7 @@ def row_products(
     """∫ L O lobe(B·ω) dω of some vertices: what `shade_glossy` does for all."""
     nodes = product_nodes(degree_of(light.shape[-1]))
     directions, project = (jnp.asarray(a, light.dtype) for a in (nodes.directions, nodes.project))
-    weights = _matmul(light, project).T
+    weights = _matmul(light, project)
     if lobes.ndim == 2:
         lobes = lobes.at[:, rows].get(mode="promise_in_bounds")
     lobes = lobes.reshape(len(lobes), -1, 1)
@@ -91,7 +92,7 @@ def row_products(
         return some * lobe(x * a + y * b + z * c, lobes)
 
     axis = axis.at[:, rows].get(mode="promise_in_bounds")
-    return _matmul(fenced(lobed, axis, samples, lobes, rows), weights).T
+    return tall_product(fenced(lobed, axis, samples, lobes, rows), weights).T
 
 
 def _matmul(a, b):

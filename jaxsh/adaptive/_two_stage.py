@@ -85,7 +85,7 @@ def _two_stage(light, staged, eye, material, settings: Filter, previous):
 
     def everyone(sampled: SampledTransfer):
         lights = light[:, : num_coefficients(sampled.degree)]
-        return lobe_products(lights, sampled, axis, lobes(sampled.degree))[0]
+        return lobe_products(lights, sampled, axis, lobes(sampled.degree))
 
     def second(rows):
         return row_products(light, staged.samples, axis, lobes(target), rows)
@@ -108,15 +108,12 @@ def _two_stage(light, staged, eye, material, settings: Filter, previous):
     color = albedo["specular"] * glossy + albedo["diffuse"] * irradiance
 
     reached = jnp.where(region, jnp.asarray(target, jnp.int32), jnp.asarray(shown, jnp.int32))
-    stages = [
-        sum_cost(one.degree, one.samples.shape[1], target) for one in (staged.base, staged.middle)
-    ]
-    last = sum_cost(target, staged.samples.shape[1], target)
+    stages = [sum_cost(one.degree, target) for one in (staged.base, staged.middle)]
     return AdaptiveResult(
         color=color.T,
         kept={"specular": kept},
         spent=sum(stages)
         + product_cost("diffuse", 0, target, target)
-        + last * jnp.mean(region, dtype=basic.dtype),
+        + sum_cost(target, target) * jnp.mean(region, dtype=basic.dtype),
         reached={"specular": reached, "diffuse": jnp.full(count, target, jnp.int32)},
     )

@@ -5,6 +5,7 @@ coefficients, for any light, and differentiates.
 """
 
 from ._bake import bake
+from ._eye_product import EyeProduct, eye_product
 from ._file import load, save
 from ._glossy import shade_glossy
 from ._light_product import LightProduct, light_product
@@ -14,11 +15,13 @@ from ._shade import shade_diffuse
 from ._transfer import Transfer
 
 __all__ = [
+    "EyeProduct",
     "LightProduct",
     "Material",
     "SampledTransfer",
     "Transfer",
     "bake",
+    "eye_product",
     "light_product",
     "load",
     "sample",

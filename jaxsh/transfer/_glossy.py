@@ -15,6 +15,7 @@ from ._lobe import lobe_polynomial, reflected
 from ._lobe_products import lobe_products
 from ._material import Material
 from ._sampled import SampledTransfer
+from ._shade import tall_product
 from ._transfer import Transfer
 
 
@@ -46,8 +47,9 @@ def shade_glossy(
       place: (batch, 1, 3, K). A batch of shared ones costs little more than one; lights of their
       own cost several times as much.
     - `transfer`: of the light's degree or above, cut to the light's. For frame after frame
-      `sample` it at that degree once, which leaves an eighth of the work. Where only the camera
-      moves, a `LightProduct` holds R already, and `light` is None.
+      `sample` it at that degree once, which leaves little of the work. Where only the camera
+      moves, a `LightProduct` holds R already, and `light` is None; where only the light turns,
+      an `eye_product` takes the place of this function.
     - `eye`: a point, or with `distant` the direction, of any length, to an eye far away.
     - `material`: albedos and the lobe's exponent. The lobe is cut to the light's degree.
     - `normalized`: whether the lobe max(0, B·ω)^k integrates to one (λ_0 = 1), so that the glossy
@@ -97,16 +99,17 @@ def _shade_glossy(light, transfer, eye, material, distant, normalized):
 def _gather(light, transfer, axis, lobes):
     """What each vertex receives through its lobe, and over its hemisphere: (..., V, 3) both."""
     *batch, _, width = light.shape
-    count = len(transfer.positions)
+    count, coefficients = len(transfer.positions), transfer.coefficients[:, :width]
     if len(batch) and batch[-1] != 1:
         # A light of its own meets the product of transfer and lobe, which needs every harmonic.
-        products = lobe_products(jnp.eye(width, dtype=light.dtype), transfer, axis, lobes)
+        unit_lights = jnp.eye(width, dtype=light.dtype)
+        products = lobe_products(unit_lights, transfer, axis, lobes).T, coefficients
         return tuple(
-            jnp.sum(jnp.multiply(*align(light, product.T[:, None])), axis=-1)
-            for product in products
+            jnp.sum(jnp.multiply(*align(light, product[:, None])), axis=-1) for product in products
         )
     rows = light.reshape(math.prod(light.shape[:-1]), width)
+    glossy = lobe_products(rows, transfer, axis, lobes).T
     return tuple(
-        jnp.moveaxis(product.reshape(*batch[:-1], 3, count), -1, -2)
-        for product in lobe_products(rows, transfer, axis, lobes)
+        jnp.moveaxis(product.reshape(count, *batch[:-1], 3), 0, -2)
+        for product in (glossy, tall_product(coefficients, rows))
     )

@@ -7,7 +7,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from ..harmonics import convolve, degree_of, evaluate, num_coefficients, phong, product_matrix
 from ._checks import checked_light
-from ._sampled import in_tiles, out_of_tiles, rows_in_tiles
+from ._layout import in_tiles, out_of_tiles, rows_in_tiles
 from ._transfer import Transfer
 
 

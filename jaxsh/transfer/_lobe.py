@@ -22,11 +22,20 @@ def reflected(
     Always a unit vector: a normal that is undefined counts as zero, which turns B into -ω_o, and
     an eye on the vertex itself is taken to be straight above it.
     """
-    normal = _unit(normals.T)
-    there = jnp.broadcast_to(eye[:, None], normal.shape) if distant else eye[:, None] - positions.T
-    towards = _unit(jnp.where(jnp.all(there == 0, axis=0, keepdims=True), normal, there))
-    cosine = normal[0] * towards[0] + normal[1] * towards[1] + normal[2] * towards[2]
-    return (2 * cosine)[None] * normal - towards
+    return mirrored(eye, positions.T, unit(normals.T), distant)
+
+
+def mirrored(
+    eye: Float[Array, " 3"],
+    positions: Float[Array, "3 v"],
+    normals: Float[Array, "3 v"],
+    distant: bool,
+) -> Float[Array, "3 v"]:
+    """`reflected` of rows, for normals that `unit` gave."""
+    there = jnp.broadcast_to(eye[:, None], normals.shape) if distant else eye[:, None] - positions
+    towards = unit(jnp.where(jnp.all(there == 0, axis=0, keepdims=True), normals, there))
+    cosine = normals[0] * towards[0] + normals[1] * towards[1] + normals[2] * towards[2]
+    return (2 * cosine)[None] * normals - towards
 
 
 def lobe_polynomial(
@@ -52,7 +61,7 @@ def lobe(t: Float[Array, "..."], polynomial: Float[Array, "bands ..."]) -> Float
     return horner(list(even)) + (t * horner(list(odd)) if len(odd) else 0.0)
 
 
-def _unit(vectors: Float[Array, "3 v"]) -> Float[Array, "3 v"]:
+def unit(vectors: Float[Array, "3 v"]) -> Float[Array, "3 v"]:
     """At unit length, or zero where there is no direction."""
     x, y, z = vectors
     defined = (jnp.isfinite(vectors).all(axis=0) & ((x != 0) | (y != 0) | (z != 0)))[None]

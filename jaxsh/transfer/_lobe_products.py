@@ -1,14 +1,13 @@
-"""Integrals of light, transfer and lobe, tile by tile of vertices."""
+"""Integrals of light, transfer and lobe, some tens of directions at a time."""
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..harmonics import degree_of
-from ..harmonics._fence import fenced
 from ._lobe import lobe
-from ._nodes import product_nodes
-from ._sampled import SampledTransfer, in_tiles, out_of_tiles, rows_in_tiles
+from ._nodes import node_passes
+from ._sampled import SampledTransfer
 from ._transfer import Transfer
 
 
@@ -17,32 +16,40 @@ def lobe_products(
     transfer: Transfer | SampledTransfer,
     axis: Float[Array, "3 v"],
     lobes: Float[Array, "bands ..."],
-) -> tuple[Float[Array, "rows v"], Float[Array, "rows v"]]:
-    """∫ L O lobe(B·ω) dω and ∫ L O dω of each light and vertex, at the lights' degree."""
-    nodes = product_nodes(degree_of(lights.shape[-1]))
+) -> Float[Array, "rows v"]:
+    """∫ L O lobe(B·ω) dω of each light and vertex, at the lights' degree."""
+    width = lights.shape[-1]
+    nodes = node_passes(degree_of(width))
     directions, basis, project = (jnp.asarray(array, axis.dtype) for array in nodes)
-    weights = _matmul(lights, project)
-    x, y, z = directions.T[..., None]
-
-    def lobed(axis, samples, lobes):
-        return samples * lobe(x * axis[:1] + y * axis[1:2] + z * axis[2:], lobes)
+    weights = _matmul(lights[None], project)
+    sampled = isinstance(transfer, SampledTransfer)
+    parts = directions, weights, transfer.samples if sampled else basis
+    lobes = lobes.reshape(len(lobes), 1, -1)
 
     @jax.checkpoint
-    def tile(part):
-        transfer_part, axis, lobes = part
-        samples = transfer_part if sampled else _matmul(basis, transfer_part.T)
-        return _matmul(weights, fenced(lobed, axis, samples, lobes)), _matmul(weights, samples)
+    def add(total, part):
+        directions, weights, samples = part
+        if not sampled:
+            samples = _matmul(samples, transfer.coefficients[:, :width].T)
+        values = samples * lobe(cosines(directions, axis), lobes)
+        return total + _matmul(weights, values), None
 
-    sampled = isinstance(transfer, SampledTransfer)
-    parts = transfer.samples if sampled else rows_in_tiles(transfer.coefficients[:, : len(project)])
-    axes = in_tiles(axis)
-    if lobes.ndim == 1:
-        lobes = lobes[:, None, None]
-        tiles = jax.lax.map(lambda part: tile((*part, lobes)), (parts, axes))
-    else:
-        tiles = jax.lax.map(tile, (parts, axes, in_tiles(lobes[:, None])))
-    glossy, irradiance = tiles
-    return out_of_tiles(glossy, axis.shape[-1]), out_of_tiles(irradiance, axis.shape[-1])
+    total, _ = jax.lax.scan(add, jnp.zeros((len(lights), axis.shape[1]), axis.dtype), parts)
+    return total
+
+
+@jax.custom_jvp
+def cosines(directions: Float[Array, "n 3"], axis: Float[Array, "3 v"]) -> Float[Array, "n v"]:
+    """Their inner products, written out: so they are computed where they are used, not stored."""
+    x, y, z = directions.T[..., None]
+    return x * axis[:1] + y * axis[1:2] + z * axis[2:]
+
+
+@cosines.defjvp
+def _cosines_jvp(primals, tangents):
+    # The transpose of what is written out would sum over directions for each of three rows.
+    _, change = jax.jvp(_matmul, primals, tangents)
+    return cosines(*primals), change
 
 
 def _matmul(a, b):

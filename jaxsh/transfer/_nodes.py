@@ -12,6 +12,8 @@ from ..harmonics._tables import legendre
 
 # Algebraic degrees for which Lebedev's rules are known.
 _LEBEDEV = (*range(3, 33, 2), *range(35, 132, 6))
+# Nodes of a pass: what they give for 50,000 vertices stays in the last cache.
+_PASS = 35
 
 
 class Nodes(NamedTuple):
@@ -41,3 +43,28 @@ def product_nodes(degree: int) -> Nodes:
     azimuth = np.where(m < 0, np.sin(-m * phi), np.cos(m * phi))
     basis = legendre(np.clip(z, -1, 1), degree) * azimuth
     return Nodes(directions.T, basis.T, basis * weights)
+
+
+class NodePasses(NamedTuple):
+    """Nodes in P passes of N, the last one filled up with directions of no weight."""
+
+    directions: Float[np.ndarray, "p n 3"]
+    basis: Float[np.ndarray, "p n k"]
+    project: Float[np.ndarray, "p k n"]
+
+
+@functools.lru_cache(maxsize=16)
+def node_passes(degree: int) -> NodePasses:
+    """Those of `product_nodes`, some tens at a time."""
+    nodes = product_nodes(degree)
+    passes = -(-len(nodes.directions) // _PASS)
+    size = -(-len(nodes.directions) // passes)
+    spare = passes * size - len(nodes.directions)
+    directions = np.pad(nodes.directions, ((0, spare), (0, 0)), mode="edge")
+    basis = np.pad(nodes.basis, ((0, spare), (0, 0)), mode="edge")
+    project = np.pad(nodes.project, ((0, 0), (0, spare)))
+    return NodePasses(
+        directions.reshape(passes, size, 3),
+        basis.reshape(passes, size, -1),
+        np.moveaxis(project.reshape(-1, passes, size), 0, 1),
+    )

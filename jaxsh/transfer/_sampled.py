@@ -8,22 +8,21 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..harmonics._indexing import check_degree
-from ._nodes import product_nodes
+from ._nodes import node_passes
 from ._transfer import Transfer
-
-# Vertices per pass: what they need stays in cache.
-TILE = 1024
 
 
 class SampledTransfer(eqx.Module):
     """Transfer of V vertices, cut to a degree, at N directions: made once by `sample`.
 
     The directions are an exact quadrature for products of three functions of that degree, so
-    that nothing is lost. `samples` are in tiles of vertices, the last one filled up with zeros.
-    At degree 10 there are 350 directions: three times the memory of the coefficients.
+    that nothing is lost. `samples` are in the passes in which shading goes through them. At degree
+    10 there are 350 directions; with the coefficients beside them, that is four times the memory
+    of the transfer.
     """
 
-    samples: Float[Array, "tiles n tile"]
+    samples: Float[Array, "passes n v"]
+    coefficients: Float[Array, "v k"]
     positions: Float[Array, "v 3"]
     normals: Float[Array, "v 3"]
     degree: int = eqx.field(static=True)
@@ -40,28 +39,13 @@ def sample(transfer: Transfer, degree: int | None = None) -> SampledTransfer:
         raise ValueError(
             f"expected a degree of at most the transfer's, {transfer.degree}, got {degree}"
         )
-    samples = _sample(transfer.coefficients, degree)
-    return SampledTransfer(samples, transfer.positions, transfer.normals, degree)
-
-
-def in_tiles(vertices: Float[Array, "*batch v"]) -> Float[Array, "tiles *batch tile"]:
-    """The last axis in tiles, the last tile filled up with the last vertex."""
-    *batch, count = vertices.shape
-    padded = jnp.pad(vertices, [(0, 0)] * len(batch) + [(0, -count % TILE)], mode="edge")
-    return jnp.moveaxis(padded.reshape(*batch, -1, TILE), -2, 0)
-
-
-def rows_in_tiles(rows: Float[Array, "v k"]) -> Float[Array, "tiles tile k"]:
-    return jnp.pad(rows, ((0, -len(rows) % TILE), (0, 0))).reshape(-1, TILE, rows.shape[1])
-
-
-def out_of_tiles(tiles: Float[Array, "tiles rows tile"], count: int) -> Float[Array, "rows v"]:
-    rows = jnp.moveaxis(tiles, 0, 1)
-    return rows.reshape(rows.shape[0], -1)[:, :count]
+    coefficients = transfer.coefficients[:, : (degree + 1) ** 2]
+    samples = _sample(coefficients, degree)
+    return SampledTransfer(samples, coefficients, transfer.positions, transfer.normals, degree)
 
 
 @functools.partial(jax.jit, static_argnums=1)
 def _sample(coefficients, degree):
-    basis = jnp.asarray(product_nodes(degree).basis, coefficients.dtype)
-    tiles = rows_in_tiles(coefficients[:, : basis.shape[1]])
-    return jax.lax.map(lambda tile: jnp.matmul(basis, tile.T, precision="highest"), tiles)
+    basis = jnp.asarray(node_passes(degree).basis, coefficients.dtype)
+    values = jnp.matmul(basis.reshape(-1, basis.shape[2]), coefficients.T, precision="highest")
+    return values.reshape(*basis.shape[:2], -1)

@@ -1,0 +1,112 @@
+"""The product of one eye, the material and the transfer: what stays while only the light turns."""
+
+import functools
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+from ..harmonics import degree_of, num_coefficients
+from ..harmonics._checks import as_float
+from ..harmonics._indexing import check_degree
+from ._checks import checked_eye, checked_material
+from ._lobe import lobe_polynomial, reflected
+from ._lobe_products import lobe_products
+from ._material import Material
+from ._shade import tall_product
+from ._transfer import Transfer
+
+
+class EyeProduct(eqx.Module):
+    """What V vertices send to one eye of the light around them: made by `eye_product`.
+
+    `coefficients` are (V, K), or (V, 3, K) where an albedo differs between the channels. Their
+    product with those of a light is radiance.
+    """
+
+    coefficients: Float[Array, "v k"] | Float[Array, "v 3 k"]
+
+    @property
+    def degree(self) -> int:
+        return degree_of(self.coefficients.shape[-1])
+
+    def __call__(self, light: Float[ArrayLike, "... 3 k"]) -> Float[Array, "... v 3"]:
+        """Radiance (..., V, 3) that leaves each vertex towards the eye: `shade_glossy` of a light.
+
+        `light` (..., 3, K) is of the product's degree, since `shade_glossy` cuts every function to
+        the light's. All vertices share it: axes in front are a batch of lights, and none of them
+        stands for the vertices. Bilinear and differentiable. Raises `ValueError` for other shapes.
+        """
+        light, width = as_float(light), self.coefficients.shape[-1]
+        if light.shape[-2:] != (3, width):
+            raise ValueError(
+                f"expected light (..., 3, {width}), of the product's degree {self.degree}, got "
+                f"shape {light.shape}"
+            )
+        return _shade(self.coefficients, light.astype(self.coefficients.dtype))
+
+
+def eye_product(
+    transfer: Transfer,
+    eye: Float[ArrayLike, " 3"],
+    material: Material,
+    *,
+    degree: int | None = None,
+    distant: bool = False,
+    normalized: bool = True,
+) -> EyeProduct:
+    """All that glossy shading does but to multiply with the light, for one eye.
+
+    `shade_glossy` is linear in the light: Σ_k L_k G_k, where G are the coefficients, at the
+    light's degree, of the transfer times ρ_d/π + ρ_s lobe(B·ω). The integral of G with any light
+    of that degree is one of three functions, so the result is the same to rounding. A frame is
+    then one product with G, which costs what diffuse shading does, or three times that where an
+    albedo differs between the channels.
+
+    **Arguments**
+
+    - `transfer`: cut to `degree` (default: all of it), that of the lights to come.
+    - `eye`, `material`, `distant`, `normalized`: as for `shade_glossy`.
+
+    Differentiable in all arguments, forward and reverse. Raises `ValueError` for shapes that do
+    not fit, and for a degree that the transfer does not have.
+    """
+    count, dtype = len(transfer.positions), transfer.positions.dtype
+    eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
+    degree = transfer.degree if degree is None else check_degree(degree)
+    if degree > transfer.degree:
+        raise ValueError(
+            f"expected a degree of at most the transfer's, {transfer.degree}, got {degree}"
+        )
+    return EyeProduct(_eye_product(transfer, eye, material, degree, distant, normalized))
+
+
+@functools.partial(jax.jit, static_argnames=("degree", "distant", "normalized"))
+def _eye_product(transfer, eye, material, degree, distant, normalized):
+    axis = reflected(eye, transfer.positions, transfer.normals, distant)
+    lobes = lobe_polynomial(material.exponent, degree, normalized)
+    unit_lights = jnp.eye(num_coefficients(degree), dtype=axis.dtype)
+    glossy = lobe_products(unit_lights, transfer, axis, lobes)
+    diffuse = transfer.coefficients[:, None, : len(unit_lights)]
+    coefficients = _column(material.diffuse / math.pi) * diffuse
+    coefficients += _column(material.specular) * glossy.T[:, None]
+    return coefficients[:, 0] if coefficients.shape[1] == 1 else coefficients
+
+
+def _column(albedo: Float[Array, "..."]) -> Float[Array, "vertices channels 1"]:
+    """An albedo beside coefficients, with axes of length 1 for what it does not depend on."""
+    return jnp.atleast_2d(albedo)[..., None]
+
+
+@jax.jit
+def _shade(coefficients, light):
+    *batch, _, width = light.shape
+    rows = light.reshape(math.prod(batch) * 3, width)
+    if coefficients.ndim == 3:
+        # Each channel's row is zero where the coefficients are another channel's.
+        own = jnp.tile(jnp.eye(3, dtype=bool), (math.prod(batch), 1))
+        rows = jnp.where(own[..., None], rows[:, None], 0.0).reshape(len(rows), 3 * width)
+    products = tall_product(coefficients.reshape(len(coefficients), rows.shape[1]), rows)
+    return jnp.moveaxis(products.reshape(len(coefficients), *batch, 3), 0, -2)
