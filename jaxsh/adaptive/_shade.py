@@ -45,10 +45,12 @@ def shade(
       Pays against products with the light's matrix, not against `shade_glossy`.
     - "probes": glossy light at `probes`, a `ProbeSet`, interpolated where it is smooth. About as
       fast as `shade_glossy`.
-    - "tiles": the lobe interpolated in the reflected direction, inside of `tiles`, a `TileSet`.
+    - "tiles": sums over few directions about the reflected one, inside of `tiles`, a `TileSet`.
       Pays against all of them.
 
-    `shade_glossy` is that of a sampled transfer, on the CPU.
+    `shade_glossy` is that of a sampled transfer, on the CPU. Where only the light turns, none of
+    these is as fast as `transfer.eye_product`, which is exact; where only the eye moves, a
+    `transfer.light_product` is at hand.
     `options` are those of the function `shade_<method>`, which says what it takes and returns.
     Experiment `leekim2014.table1` prints what each method gains, and what it costs in quality.
 

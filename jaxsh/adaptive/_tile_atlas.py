@@ -9,7 +9,16 @@ from jaxtyping import Array, ArrayLike, Float, Int
 from ..sphere import fibonacci
 from ..transfer import Transfer
 from ..transfer._checks import checked_eye
-from ._tile_sets import BLOCK, TileSet, Tiling, arrange, make_tiling, vertex_areas
+from ._tile_sets import (
+    BLOCK,
+    DIRECTIONS,
+    EXPONENT,
+    TileSet,
+    Tiling,
+    arrange,
+    make_tiling,
+    vertex_areas,
+)
 
 
 class TileAtlas(eqx.Module):
@@ -20,18 +29,19 @@ class TileAtlas(eqx.Module):
 
     order: Int[Array, "views blocks b"]
     tile: Int[Array, "views blocks"]
-    directions: Float[Array, "views 3"]  # from the centre to each eye
+    axes: Float[Array, "views tiles 3"]
+    eyes: Float[Array, "views 3"]  # directions from the centre to each eye
     centre: Float[Array, " 3"]  # of the mesh's box; zero where the eyes are far away
-    areas: Float[Array, " v"]  # relative
-    count: int = eqx.field(static=True)
+    directions: int = eqx.field(static=True)
+    exponent: float = eqx.field(static=True)
 
     def view(self, eye: Float[ArrayLike, " 3"]) -> int:
         """The number of the view whose direction is nearest to that of `eye`."""
         towards = np.asarray(checked_eye(eye, self.centre.dtype)) - np.asarray(self.centre)
-        return int(np.argmax(np.asarray(self.directions) @ towards))
+        return int(np.argmax(np.asarray(self.eyes) @ towards))
 
     def tiling(self, view: int) -> Tiling:
-        return Tiling(self.order[view], self.tile[view], self.count)
+        return Tiling(self.order[view], self.tile[view], self.axes[view])
 
     def nearest(self, transfer: Transfer, eye: Float[ArrayLike, " 3"]) -> TileSet:
         """The tile set of the nearest view. All sets of an atlas have the same shapes."""
@@ -39,16 +49,19 @@ class TileAtlas(eqx.Module):
 
     def arranged(self, transfer: Transfer, view: int) -> TileSet:
         """The tile set of a view, by its number."""
-        return arrange(transfer, self.tiling(view), self.areas)
+        tiling = self.tiling(view)
+        return arrange(transfer, tiling, directions=self.directions, exponent=self.exponent)
 
 
 def make_tile_atlas(
     transfer: Transfer,
     *,
     distance: float | None = None,
-    views: int = 128,
-    count: int = 192,
+    views: int = 96,
+    count: int = 96,
     block: int = BLOCK,
+    directions: int = DIRECTIONS,
+    exponent: float = EXPONENT,
 ) -> TileAtlas:
     """Tilings for `views` directions, spread evenly over the sphere.
 
@@ -57,19 +70,21 @@ def make_tile_atlas(
     """
     if views < 1:
         raise ValueError(f"expected at least 1 view, got {views}")
-    directions = fibonacci(views).directions.astype(transfer.positions.dtype)
+    towards = fibonacci(views).directions.astype(transfer.positions.dtype)
     distant, centre = distance is None, jnp.zeros((3,), transfer.positions.dtype)
-    eyes = directions
+    eyes = towards
     if distance is not None:
         centre = (transfer.positions.max(axis=0) + transfer.positions.min(axis=0)) / 2
-        eyes = centre[None] + distance * directions
+        eyes = centre[None] + distance * towards
     areas = vertex_areas(transfer)
     tilings = [
         make_tiling(transfer, eye, distant=distant, count=count, block=block, areas=areas)
         for eye in eyes
     ]
-    order, tile = (jnp.stack([getattr(one, name) for one in tilings]) for name in ("order", "tile"))
-    return TileAtlas(order, tile, directions, centre, jnp.asarray(areas), tilings[0].count)
+    order, tile, axes = (
+        jnp.stack([getattr(one, name) for one in tilings]) for name in ("order", "tile", "axes")
+    )
+    return TileAtlas(order, tile, axes, towards, centre, directions, exponent)
 
 
 class TileFollower:

@@ -8,25 +8,29 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from ..harmonics import degree_of
+from ..harmonics import degree_of, evaluate, rotate
 from ..transfer import Transfer
 from ..transfer._checks import checked_eye
-from ..transfer._lobe import reflected
+from ..transfer._lobe import reflected, unit
+from ._local_rule import local_rule
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 128
+DIRECTIONS = 48
+EXPONENT = 32.0
 
 
 class Tiling(eqx.Module):
     """Vertices in blocks, blocks in tiles: indices alone. Made by `make_tiling`.
 
     `order` names the vertex at each place, with some vertices twice where blocks must be filled
-    up; `tile` is the tile of each block, ascending.
+    up; `tile` is the tile of each block, ascending. `axes` are where a tile's vertices mirror the
+    eye, on average.
     """
 
     order: Int[Array, "blocks b"]
     tile: Int[Array, " blocks"]
-    count: int = eqx.field(static=True)
+    axes: Float[Array, "tiles 3"]
 
 
 class TileSet(eqx.Module):
@@ -38,14 +42,15 @@ class TileSet(eqx.Module):
 
     tiling: Tiling
     place: Int[Array, " v"]  # where in `order` each vertex is
-    coefficients: Float[Array, "blocks k b"]
-    positions: Float[Array, "places 3"]
-    normals: Float[Array, "places 3"]
-    areas: Float[Array, "blocks b"]  # relative; 0 where a vertex stands a second time
+    samples: Float[Array, "blocks n b"]  # of the transfer, in the directions of each tile
+    directions: Float[Array, "tiles n 3"]
+    basis: Float[Array, "tiles n k"]  # there
+    positions: Float[Array, "3 places"]
+    normals: Float[Array, "3 places"]  # at unit length
 
     @property
     def degree(self) -> int:
-        return degree_of(self.coefficients.shape[1])
+        return degree_of(self.basis.shape[-1])
 
 
 def make_tiles(
@@ -53,22 +58,28 @@ def make_tiles(
     eye: Float[ArrayLike, " 3"],
     *,
     distant: bool = False,
-    count: int = 192,
+    count: int = 96,
     block: int = BLOCK,
+    directions: int = DIRECTIONS,
+    exponent: float = EXPONENT,
 ) -> TileSet:
-    """Tiles for the view from `eye`: the transfer regrouped by reflected direction.
+    """Tiles for the view from `eye`: the transfer regrouped, and sampled, by reflected direction.
 
     **Arguments**
 
     - `transfer`: concrete.
     - `eye`: a point, or with `distant` the direction to an eye far away.
-    - `count`: of tiles. More are more exact, and cost more per frame.
+    - `count`: of tiles. More are more exact.
     - `block`: the number of vertices that a tile's size is a multiple of.
+    - `directions`: of each tile. More are more exact, and cost more per frame; as many as
+      `transfer.sample` takes leave no error.
+    - `exponent`: of the lobes to come. Others are less exact.
 
-    Takes the transfer's memory once more. Neither traceable nor differentiable; raises
-    `ValueError` for an eye that is no vector and for a count or block below 1.
+    Takes `directions` numbers a vertex. Neither traceable nor differentiable; raises `ValueError`
+    for an eye that is no vector, and for a count, block, directions or exponent below 1.
     """
-    return arrange(transfer, make_tiling(transfer, eye, distant=distant, count=count, block=block))
+    tiling = make_tiling(transfer, eye, distant=distant, count=count, block=block)
+    return arrange(transfer, tiling, directions=directions, exponent=exponent)
 
 
 def make_tiling(
@@ -76,16 +87,16 @@ def make_tiling(
     eye: Float[ArrayLike, " 3"],
     *,
     distant: bool = False,
-    count: int = 192,
+    count: int = 96,
     block: int = BLOCK,
     areas: Float[ArrayLike, " v"] | None = None,
 ) -> Tiling:
     """Split all vertices again and again, the costliest tile first, into `count` tiles.
 
-    A tile costs Σ area·(max(n·ω_o, 0) + 0.05)·|B - B̄|⁶, in proportion to the squared error of a
-    quadratic, and is split at the middle of its extent along its longest axis. Where there are
-    fewer blocks than `count`, each is a tile. Arguments and errors as for `make_tiles`; `areas` of
-    the vertices, from `vertex_areas`, where they are known already.
+    A tile costs Σ area·(max(n·ω_o, 0) + 0.05)·|B - B̄|⁶, and is split at the middle of its extent
+    along its longest axis. Where there are fewer blocks than `count`, each is a tile. Arguments
+    and errors as for `make_tiles`; `areas` of the vertices, from `vertex_areas`, where they are
+    known already.
     """
     if count < 1 or block < 1:
         raise ValueError(f"expected count and block of at least 1, got {count} and {block}")
@@ -99,40 +110,72 @@ def make_tiling(
     vertices = np.concatenate([np.arange(len(weights)), np.full(spare, len(weights) - 1)])
     tiles = _split(axis.T, weights, vertices, min(count, blocks), block)
     sizes = [len(tile) // block for tile in tiles]
+    axes = [_towards(weights[tile] @ axis.T[tile]) for tile in tiles]
     return Tiling(
         jnp.asarray(np.concatenate(tiles).reshape(-1, block).astype(np.int32)),
         jnp.asarray(np.repeat(np.arange(len(tiles), dtype=np.int32), sizes)),
-        len(tiles),
+        jnp.asarray(np.stack(axes), transfer.positions.dtype),
     )
 
 
 def arrange(
-    transfer: Transfer, tiling: Tiling, areas: Float[ArrayLike, " v"] | None = None
+    transfer: Transfer,
+    tiling: Tiling,
+    *,
+    directions: int = DIRECTIONS,
+    exponent: float = EXPONENT,
 ) -> TileSet:
-    """The transfer in the order of a tiling, whose `areas` `TileAtlas` knows already.
+    """The transfer in the order of a tiling, in directions about each tile's own.
 
-    Raises `ValueError` where it is of another mesh.
+    Other arguments and errors as for `make_tiles`; raises `ValueError` for a tiling of another
+    mesh too.
     """
+    if directions < 1 or not exponent >= 1:
+        raise ValueError(
+            f"expected directions and exponent of at least 1, got {directions} and {exponent}"
+        )
     order, vertices = np.asarray(tiling.order), len(transfer.positions)
     place = np.full(vertices, -1, np.int32)
     place[order.ravel()] = np.arange(order.size, dtype=np.int32)
     if order.max() >= vertices or place.min() < 0:
         raise ValueError(f"expected a tiling of {vertices} vertices, got one of {order.max() + 1}")
-    first = place[order].ravel() == np.arange(order.size)
-    areas = vertex_areas(transfer) if areas is None else np.asarray(areas)
-    areas = areas[order] * first.reshape(order.shape)
-    return _arrange(transfer, tiling, jnp.asarray(place), jnp.asarray(areas))
+    dtype = transfer.positions.dtype
+    rule = local_rule(transfer.degree, directions, float(exponent))
+    return _arrange(transfer, tiling, jnp.asarray(place), *(jnp.asarray(a, dtype) for a in rule))
 
 
 @jax.jit
-def _arrange(transfer, tiling, place, areas):
+def _arrange(transfer, tiling, place, directions, rows):
+    turns = _turns(tiling.axes)
+    directions = jnp.matmul(directions[None], jnp.swapaxes(turns, 1, 2), precision="highest")
+    rows = rotate(rows, turns[:, None])
+
+    def sampled(part):
+        vertices, tile = part
+        coefficients = transfer.coefficients.at[vertices].get(mode="promise_in_bounds")
+        return jnp.matmul(rows[tile], coefficients.T, precision="highest")
+
+    samples = jax.lax.map(sampled, (tiling.order, tiling.tile))
+    basis = evaluate(directions, transfer.degree)
     order = tiling.order.reshape(-1)
-    coefficients = jax.lax.map(
-        lambda rows: transfer.coefficients.at[rows].get(mode="promise_in_bounds").T, tiling.order
-    )
-    positions, normals = transfer.positions[order], transfer.normals[order]
-    areas = areas.astype(coefficients.dtype)
-    return TileSet(tiling, place, coefficients, positions, normals, areas)
+    positions, normals = transfer.positions[order].T, unit(transfer.normals[order].T)
+    return TileSet(tiling, place, samples, directions, basis, positions, normals)
+
+
+def _turns(axes: Float[Array, "tiles 3"]) -> Float[Array, "tiles 3 3"]:
+    """Rotations that take +z to each axis (Duff et al. 2017, "Building an orthonormal basis")."""
+    x, y, z = axes.T
+    sign = jnp.where(z < 0, -1.0, 1.0).astype(axes.dtype)
+    a = -1 / (sign + z)
+    b = x * y * a
+    first = jnp.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=-1)
+    return jnp.stack([first, jnp.stack([b, sign + y * y * a, -y], axis=-1), axes], axis=-1)
+
+
+def _towards(vector: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
+    """At unit length, or +z where there is no direction."""
+    length = np.linalg.norm(vector)
+    return vector / length if length > 0 else np.array([0.0, 0.0, 1.0])
 
 
 def _split(axis, weights, vertices, count, block) -> list[np.ndarray]:

@@ -1,20 +1,19 @@
-"""The glossy lobe interpolated in the reflected direction, tile by tile of vertices."""
+"""The glossy lobe where it looks: sums over few directions, tile by tile of vertices."""
 
 import functools
-import math
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics import convolve, degree_of, evaluate, phong, product_matrix
+from ..harmonics import degree_of
+from ..harmonics._fence import fenced
 from ..transfer import Material, Transfer, shade_diffuse
 from ..transfer._checks import checked_eye, checked_light, checked_material
-from ..transfer._lobe import reflected
-from ._costs import full_cost
+from ..transfer._lobe import lobe, lobe_polynomial, mirrored
+from ..transfer._shade import tall_product
+from ._costs import product_cost, sum_cost
 from ._result import AdaptiveResult
-from ._tile_frames import POWERS, Frames, constant, monomials, nodes, tile_frames
-from ._tile_kernel import polynomial_products
 from ._tile_sets import TileSet
 
 
@@ -28,30 +27,30 @@ def shade_tiles(
     distant: bool = False,
     normalized: bool = True,
 ) -> AdaptiveResult:
-    """What `transfer.shade_glossy` gives, with the lobe interpolated in the reflected direction.
+    """What `transfer.shade_glossy` gives, with each tile's lobes summed where they look.
 
-    For a fixed vertex the glossy part is a smooth function of B, the eye's direction mirrored
-    about the normal. In a tile of vertices with similar B the lobe's coefficients are fitted by
-    the six quadratic monomials φ of B, so that
+    `shade_glossy` sums light times transfer times lobe over directions all around, as many as
+    are exact: 350 at degree 10. The vertices of a tile mirror the eye to nearly the same
+    direction B, and a lobe is small away from it. So a tile has a few directions of its own,
 
-        S + D = Σ_t φ_t(B) (M_t · O),   M_t = L̂ Σ_s P_ts ρ_s (α ∘ y(B_s)) + [|B|²]_t ρ_d/π L,
+        S = ρ_s Σ_n L(ω_n) lobe(B·ω_n) (A O)_n,
 
-    with seven nodes B_s about the tile's middle (`docs/adaptive_tiles.md`). All bands of light,
-    transfer and lobe are kept; the one error is that of the fit. It is of third order in a tile's
-    width, and zero (to rounding) where all of a tile's vertices have one B, and where the lobe
-    has bands 0 and 2 alone. There is no threshold, so nothing pops. Not in Lee & Kim 2014. It pays
-    against `shade_glossy` of a sampled transfer; experiment `leekim2014.table1` prints by how much.
+    with weights A that make the most of them (`docs/adaptive_tiles.md`). No band of light,
+    transfer or lobe is dropped, and each vertex has its own B. There is no threshold, so nothing
+    pops. The diffuse part is computed in full. Not in Lee & Kim 2014. Experiment
+    `leekim2014.table1` prints what it gains.
 
     **Arguments**
 
     - `light`, `eye`, `material`, `distant`, `normalized`: as for `shade_glossy`; one light (3, K)
-      and one exponent. Albedos per vertex take the diffuse part apart, at its cost.
+      and one exponent.
     - `transfer`: what `tiles` was made of.
-    - `tiles`: from `make_tiles`, or `TileAtlas.nearest`. Its middle directions and widths are of
-      this `eye`, frame by frame, so that an eye other than its own costs accuracy and no more.
+    - `tiles`: from `make_tiles`, or `TileAtlas.nearest`. An eye or an exponent other than those it
+      was made for costs accuracy and no more.
 
     **Returns** an `AdaptiveResult`; `kept` is empty. Linear in light and albedos, and
-    differentiable in them and in the exponent, forward and reverse; eye and tiles are constants.
+    differentiable in them, in the eye and in the exponent, forward and reverse; the transfer's
+    glossy part is a constant.
 
     Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
     """
@@ -64,6 +63,11 @@ def shade_tiles(
     light = checked_light(light, count, transfer.degree, dtype)
     if light.ndim != 2:
         raise ValueError(f"expected one light (3, K) for all vertices, got shape {light.shape}")
+    if degree_of(light.shape[-1]) != tiles.degree:
+        raise ValueError(
+            f"expected a light of the tiles' degree, {tiles.degree}, got "
+            f"{degree_of(light.shape[-1])}"
+        )
     eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
     if material.exponent.ndim:
         raise ValueError(f"expected one exponent, got one for each of {count} vertices")
@@ -72,55 +76,57 @@ def shade_tiles(
 
 @functools.partial(jax.jit, static_argnames=("distant", "normalized"))
 def _shade_tiles(light, transfer, eye, material, tiles, distant, normalized):
-    width, even = light.shape[-1], max(material.specular.ndim, material.diffuse.ndim) < 2
-    specular = material.specular if even else jnp.ones((), light.dtype)
-    diffuse = material.diffuse if even else jnp.zeros((), light.dtype)
+    tile, (blocks, size) = tiles.tiling.tile, tiles.tiling.order.shape
+    count, directions, width = tiles.basis.shape
+    lights = tall_product(tiles.basis.reshape(-1, width), light)
+    weights = jnp.swapaxes(lights.reshape(count, directions, 3), 1, 2)
 
-    blocks, size = tiles.tiling.order.shape
-    axis, normals = (
-        jax.lax.stop_gradient(rows).reshape(3, blocks, size)
-        for rows in (reflected(eye, tiles.positions, tiles.normals, distant), tiles.normals.T)
-    )
-    tile, count = tiles.tiling.tile, tiles.tiling.count
-    frames = jax.lax.stop_gradient(tile_frames(axis, normals, tiles.areas, tile, count))
-    lobe = phong(material.exponent, degree_of(width), normalized=normalized)
-    terms = _terms(light, frames, lobe, specular, diffuse)
-    columns = tiles.coefficients[:, :width]
-    color = polynomial_products(terms[tile], columns, monomials(axis, frames, tile))
-    color = jnp.swapaxes(color, 1, 2).reshape(-1, 3)
-    color = color.at[tiles.place].get(mode="promise_in_bounds")
-    if not even:
-        flat = (
-            jnp.broadcast_to(material.specular, color.shape)
-            if material.specular.ndim == 2
-            else (material.specular.reshape((1, -1)))
-        )
-        color = color * flat + shade_diffuse(light, transfer, material.diffuse)
-    per_vertex = 1 + count * width / len(transfer.positions)
-    spent = len(POWERS) * 3 * width * per_vertex / full_cost(degree_of(width))
+    axis = mirrored(eye, tiles.positions, tiles.normals, distant).reshape(3, blocks, 1, size)
+    lobes = lobe_polynomial(material.exponent, tiles.degree, normalized).reshape(-1, 1, 1, 1)
+    values = fenced(_lobed, axis, tiles.directions[tile], lobes, tiles.samples)
+    glossy = fenced(weighted_sums, weights[tile], values)
+    glossy = jnp.swapaxes(glossy, 1, 2).reshape(-1, 3)
+    glossy = glossy.at[tiles.place].get(mode="promise_in_bounds")
+
+    albedo = material.specular
+    albedo = albedo if albedo.ndim == 2 else albedo.reshape(1, -1)
+    color = glossy * albedo + shade_diffuse(light, transfer, material.diffuse)
+    degree = tiles.degree
+    spent = product_cost("diffuse", 0, degree, degree) + sum_cost(degree, degree, directions)
     return AdaptiveResult(color, {}, jnp.asarray(spent, color.dtype))
 
 
-def _terms(
-    light: Float[Array, "3 k"],
-    frames: Frames,
-    lobe: Float[Array, " bands"],
-    specular: Float[Array, "..."],
-    diffuse: Float[Array, "..."],
-) -> Float[Array, "tiles 6 3 k"]:
-    """M: L̂ Σ_s P_ts ρ_s (α ∘ y(B_s)) + [|B|²]_t ρ_d/π L, as one matrix product.
+def _lobed(axis, directions, lobes, samples):
+    x, y, z = (directions[..., i, None] for i in range(3))
+    return samples * lobe(x * axis[0] + y * axis[1] + z * axis[2], lobes)
 
-    Nothing comes after the product, since XLA would compute that anew for every vertex.
+
+@jax.custom_jvp
+def weighted_sums(
+    weights: Float[Array, "blocks r n"], values: Float[Array, "blocks n b"]
+) -> Float[Array, "blocks r b"]:
+    """Σ_n w_rn f_nv for each vertex v of each block.
+
+    XLA's CPU backend multiplies so many narrow matrices one after the other on one core, and each
+    is copied first. With the sum over n written out the whole is one loop over vertices, which it
+    vectorises and splits over the cores.
     """
-    width = light.shape[-1]
-    directions, fit = nodes(frames)
-    lobes = convolve(evaluate(directions, degree_of(width)), lobe.astype(light.dtype))
-    glossy = jnp.matmul(fit, lobes, precision="highest")
-    rows = jnp.concatenate([glossy, constant(frames)[..., None]], axis=-1)
-    product = product_matrix(light) * specular.reshape(-1, 1, 1)  # symmetric in its last two axes
-    irradiance = light * (diffuse / math.pi).reshape(-1, 1)
-    columns = jnp.concatenate([product, irradiance[..., None]], axis=-1)
-    terms = jnp.matmul(
-        rows.reshape(-1, width + 1), columns.reshape(-1, width + 1).T, precision="highest"
-    )
-    return terms.reshape(*rows.shape[:2], *light.shape)
+    return jax.lax.platform_dependent(weights, values, cpu=_written_out, default=_as_matrices)
+
+
+@weighted_sums.defjvp
+def _weighted_sums_jvp(primals, tangents):
+    # The written-out sum would be transposed term by term.
+    _, change = jax.jvp(_as_matrices, primals, tangents)
+    return weighted_sums(*primals), change
+
+
+def _written_out(weights, values):
+    total = jnp.zeros((len(values), weights.shape[1], values.shape[2]), values.dtype)
+    for n in range(values.shape[1]):
+        total = total + weights[:, :, n, None] * values[:, n, None]
+    return total
+
+
+def _as_matrices(weights, values):
+    return jnp.matmul(weights, values, precision="highest")

@@ -17,7 +17,7 @@ def test_every_method_at_its_finest_is_the_full_computation(rng):
         "levels": everyone,
         "two_stage": everyone,
         "probes": {"probes": adaptive.make_probes(made, share=0.2), "threshold": 0.0},
-        "tiles": {"tiles": adaptive.make_tiles(made, eye, count=len(made.positions), block=1)},
+        "tiles": {"tiles": adaptive.make_tiles(made, eye, directions=500)},
     }
     full = shade_glossy(light, made, eye, material)
     staged = adaptive.stage(made)
