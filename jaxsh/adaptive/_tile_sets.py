@@ -76,7 +76,8 @@ def make_tiles(
     - `exponent`: of the lobes to come. Others are less exact.
 
     Takes `directions` numbers a vertex. Neither traceable nor differentiable; raises `ValueError`
-    for an eye that is no vector, and for a count, block, directions or exponent below 1.
+    for an eye that is no vector, for a count, block or directions below 1, and for an exponent
+    that is not above 0.
     """
     tiling = make_tiling(transfer, eye, distant=distant, count=count, block=block)
     return arrange(transfer, tiling, directions=directions, exponent=exponent)
@@ -130,9 +131,9 @@ def arrange(
     Other arguments and errors as for `make_tiles`; raises `ValueError` for a tiling of another
     mesh too.
     """
-    if directions < 1 or not exponent >= 1:
+    if directions < 1 or not exponent > 0:
         raise ValueError(
-            f"expected directions and exponent of at least 1, got {directions} and {exponent}"
+            f"expected directions of at least 1 and exponent above 0, got {directions}, {exponent}"
         )
     order, vertices = np.asarray(tiling.order), len(transfer.positions)
     place = np.full(vertices, -1, np.int32)

@@ -49,8 +49,9 @@ def load(path: str | os.PathLike[str]) -> Transfer:
     if not zipfile.is_zipfile(path):
         raise ValueError(f"{path}: not a transfer file, or a truncated one")
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: np.asarray(file[name]) for name in file.files}
+        # Opened here, since NumPy leaves a damaged archive open.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            arrays = {name: np.asarray(stored[name]) for name in stored.files}
     except Exception as error:  # a damaged archive may raise anything
         reason = str(error).strip().split("\n")[0] or type(error).__name__
         raise ValueError(f"{path}: damaged: {reason}") from error

@@ -213,7 +213,7 @@ def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
         arrange(ball, Tiling(other.tiling.order, other.tiling.tile, other.tiling.axes))
     with pytest.raises(ValueError, match="light of the tiles' degree"):
         shade_tiles(light[:, :9], ball, EYE, MATERIAL, tiles)
-    with pytest.raises(ValueError, match="directions and exponent"):
+    with pytest.raises(ValueError, match="directions of at least 1"):
         make_tiles(ball, EYE, directions=0)
     with pytest.raises(ValueError, match="at least 1"):
         make_tiles(ball, EYE, count=0)
