@@ -37,7 +37,7 @@ class Figure10(Look):
     """hysteresis: thresholds of those inside are so many times as high"""
     windows: tuple[Window, ...] = ("none", "sinc", "dering")
     """of the light, against ringing; the first is in the pictures"""
-    views: int = 96
+    views: int = 128
     """directions all around that tiles are made for beforehand"""
     sheet: int = 4
     """frames in a row on the sheet"""

@@ -45,7 +45,7 @@ class Table1:
     """frames of each way, in turns"""
     directions: int = 2048
     """directions of the bake"""
-    views: int = 96
+    views: int = 128
     """tilings for the eye that moves"""
     step: float = 2.0
     """of the eye that moves, in degrees a frame"""

@@ -8,6 +8,7 @@ from jaxtyping import ArrayLike, Float
 
 from ..harmonics import degree_of
 from ..harmonics._checks import align
+from ..harmonics._fence import fenced
 from ..transfer import Material, Transfer, shade_diffuse
 from ..transfer._lobe import lobe_polynomial, reflected
 from ..transfer._lobe_products import lobe_products
@@ -88,12 +89,10 @@ def _shade_probes(light, transfer, eye, material, probes, limits, distant, norma
     base = lobe_products(light[:, :width], probes.base, axis, base_polynomial)
     at_probes = everywhere(lambda i: in_full(probes.probes[i]), len(probes.probes))
     rest = at_probes - base[:, probes.probes]
-    near = [rest[:, probes.nearest[:, i]] for i in range(NEAREST)]
-    spread = functools.reduce(jnp.maximum, near) - functools.reduce(jnp.minimum, near)
+    spread, carried = fenced(_between, rest, probes.nearest, probes.weights, base)
     albedo = material.specular
     specular = albedo.T if albedo.ndim == 2 else albedo.reshape(-1, 1)
-    active = jnp.max(spread * specular, axis=0) * exposure >= threshold
-    carried = base + sum(w[None] * n for w, n in zip(probes.weights.T, near, strict=True))
+    active = fenced(_uneven, spread, specular, exposure, threshold)
     glossy = jnp.where(active[None], compacted(in_full, active), carried).T
 
     diffuse = shade_diffuse(light, transfer, material.diffuse)
@@ -106,3 +105,14 @@ def _shade_probes(light, transfer, eye, material, probes, limits, distant, norma
     once = sum_cost(probes.base.degree, target) + product_cost("diffuse", 0, target, target)
     again = sum_cost(target, target)
     return AdaptiveResult(color, shares, once + again * (shares["probes"] + shares["specular"]))
+
+
+def _between(rest, nearest, weights, base):
+    """How much a vertex's probes differ, and what they say of it."""
+    near = [rest[:, nearest[:, i]] for i in range(NEAREST)]
+    spread = functools.reduce(jnp.maximum, near) - functools.reduce(jnp.minimum, near)
+    return spread, base + sum(w[None] * n for w, n in zip(weights.T, near, strict=True))
+
+
+def _uneven(spread, specular, exposure, threshold):
+    return jnp.max(spread * specular, axis=0) * exposure >= threshold

@@ -57,7 +57,7 @@ def make_tile_atlas(
     transfer: Transfer,
     *,
     distance: float | None = None,
-    views: int = 96,
+    views: int = 128,
     count: int = 96,
     block: int = BLOCK,
     directions: int = DIRECTIONS,

@@ -37,7 +37,8 @@ def shade_tiles(
 
     with weights A that make the most of them (`docs/adaptive_tiles.md`). No band of light,
     transfer or lobe is dropped, and each vertex has its own B. There is no threshold, so nothing
-    pops. The diffuse part is computed in full. Not in Lee & Kim 2014. Experiment
+    pops from frame to frame; only where another tile set takes over does the error change at
+    once. The diffuse part is computed in full. Not in Lee & Kim 2014. Experiment
     `leekim2014.table1` prints what it gains.
 
     **Arguments**

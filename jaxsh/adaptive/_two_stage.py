@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
 from ..harmonics import degree_of, num_coefficients
+from ..harmonics._fence import fenced
 from ..transfer import Material, SampledTransfer, Transfer
 from ..transfer._lobe import lobe_polynomial, reflected
 from ..transfer._lobe_products import lobe_products
@@ -91,7 +92,8 @@ def _two_stage(light, staged, eye, material, settings: Filter, previous):
         return row_products(light, staged.samples, axis, lobes(target), rows)
 
     basic, first = everyone(staged.base), everyone(staged.middle)
-    region = seen_as_changed(
+    region = fenced(
+        seen_as_changed,
         jax.lax.stop_gradient(first - basic),
         threshold("specular", target, settings, previous, count),
         jax.lax.stop_gradient(settings.exposure * albedo["specular"]),

@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 from numpy.polynomial import Polynomial
 
 from ..harmonics import phong
+from ..harmonics._fence import fenced
 from ..harmonics._unit import normalize
 
 
@@ -22,7 +23,9 @@ def reflected(
     Always a unit vector: a normal that is undefined counts as zero, which turns B into -ω_o, and
     an eye on the vertex itself is taken to be straight above it.
     """
-    return mirrored(eye, positions.T, unit(normals.T), distant)
+    # Once, where XLA would take rows out of columns again for each component of what follows.
+    rows = fenced(lambda positions, normals: (positions.T, unit(normals.T)), positions, normals)
+    return mirrored(eye, *rows, distant)
 
 
 def mirrored(
