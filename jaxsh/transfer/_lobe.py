@@ -2,6 +2,7 @@
 
 import functools
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -12,6 +13,7 @@ from ..harmonics._fence import fenced
 from ..harmonics._unit import normalize
 
 
+@functools.partial(jax.jit, static_argnums=3)
 def reflected(
     eye: Float[Array, " 3"],
     positions: Float[Array, "v 3"],
