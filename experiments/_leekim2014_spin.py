@@ -59,7 +59,8 @@ def methods(
     probes = make_probes(scene.baked)
     centre = (jnp.max(scene.baked.positions, axis=0) + jnp.min(scene.baked.positions, axis=0)) / 2
     distance = float(jnp.linalg.norm(scene.eye - centre))
-    atlas = make_tile_atlas(scene.baked, distance=distance, views=views)
+    exponent = float(scene.material.exponent)
+    atlas = make_tile_atlas(scene.baked, distance=distance, views=views, exponent=exponent)
     degree = round(0.7 * scene.row.degree)
 
     def by(method: str, baked: Any = scene.baked, **options: Any) -> Shade:

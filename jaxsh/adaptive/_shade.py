@@ -45,7 +45,7 @@ def shade(
       Pays against products with the light's matrix, not against `shade_glossy`.
     - "probes": glossy light at `probes`, a `ProbeSet`, interpolated where it is smooth. About as
       fast as `shade_glossy`.
-    - "tiles": sums over few directions about the reflected one, inside of `tiles`, a `TileSet`.
+    - "tiles": sums over few directions about the reflected one, those of `tiles`, a `TileSet`.
       Pays against all of them.
 
     `shade_glossy` is that of a sampled transfer, on the CPU. Where only the light turns, none of

@@ -9,6 +9,7 @@ from jaxtyping import Array, ArrayLike, Float, Int
 from ..sphere import fibonacci
 from ..transfer import Transfer
 from ..transfer._checks import checked_eye
+from ._local_rule import check_rule
 from ._tile_sets import (
     BLOCK,
     DIRECTIONS,
@@ -41,6 +42,8 @@ class TileAtlas(eqx.Module):
         return int(np.argmax(np.asarray(self.eyes) @ towards))
 
     def tiling(self, view: int) -> Tiling:
+        if not 0 <= view < len(self.eyes):
+            raise ValueError(f"expected a view from 0 to {len(self.eyes) - 1}, got {view}")
         return Tiling(self.order[view], self.tile[view], self.axes[view])
 
     def nearest(self, transfer: Transfer, eye: Float[ArrayLike, " 3"]) -> TileSet:
@@ -68,6 +71,7 @@ def make_tile_atlas(
     The eyes stand at `distance` from the centre of the mesh's box, or far away (default). Other
     arguments and errors as for `make_tiles`; raises `ValueError` for fewer than one view too.
     """
+    check_rule(directions, exponent)
     if views < 1:
         raise ValueError(f"expected at least 1 view, got {views}")
     towards = fibonacci(views).directions.astype(transfer.positions.dtype)

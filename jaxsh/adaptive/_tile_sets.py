@@ -12,7 +12,7 @@ from ..harmonics import degree_of, evaluate, rotate
 from ..transfer import Transfer
 from ..transfer._checks import checked_eye
 from ..transfer._lobe import reflected, unit
-from ._local_rule import local_rule
+from ._local_rule import check_rule, local_rule
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 128
@@ -23,8 +23,8 @@ EXPONENT = 32.0
 class Tiling(eqx.Module):
     """Vertices in blocks, blocks in tiles: indices alone. Made by `make_tiling`.
 
-    `order` names the vertex at each place, with some vertices twice where blocks must be filled
-    up; `tile` is the tile of each block, ascending. `axes` are where a tile's vertices mirror the
+    `order` names the vertex at each place, the last vertex again where a block must be filled up;
+    `tile` is the tile of each block, ascending. `axes` are where a tile's vertices mirror the
     eye, on average.
     """
 
@@ -77,8 +77,9 @@ def make_tiles(
 
     Takes `directions` numbers a vertex. Neither traceable nor differentiable; raises `ValueError`
     for an eye that is no vector, for a count, block or directions below 1, and for an exponent
-    that is not above 0.
+    that is not above -1.
     """
+    check_rule(directions, exponent)
     tiling = make_tiling(transfer, eye, distant=distant, count=count, block=block)
     return arrange(transfer, tiling, directions=directions, exponent=exponent)
 
@@ -96,24 +97,25 @@ def make_tiling(
 
     A tile costs Σ area·(max(n·ω_o, 0) + 0.05)·|B - B̄|⁶, and is split at the middle of its extent
     along its longest axis. Where there are fewer blocks than `count`, each is a tile. Arguments
-    and errors as for `make_tiles`; `areas` of the vertices, from `vertex_areas`, where they are
-    known already.
+    and errors as for `make_tiles`, whose own these are; `areas` of the vertices, relative to their
+    mean, where they are known already.
     """
     if count < 1 or block < 1:
         raise ValueError(f"expected count and block of at least 1, got {count} and {block}")
     eye = checked_eye(eye, transfer.positions.dtype)
     axis = np.asarray(reflected(eye, transfer.positions, transfer.normals, distant), np.float32)
-    facing = np.sum(np.asarray(transfer.normals).T * axis, axis=0)
+    facing = np.sum(np.asarray(unit(transfer.normals.T)) * axis, axis=0)
     areas = vertex_areas(transfer) if areas is None else np.asarray(areas)
     weights = areas * (np.maximum(facing, 0) + 0.05)
-    blocks = -(-len(weights) // block)
+    blocks, last = -(-len(weights) // block), len(weights) - 1
+    # What fills the last block up weighs nothing.
     spare = blocks * block - len(weights)
-    vertices = np.concatenate([np.arange(len(weights)), np.full(spare, len(weights) - 1)])
-    tiles = _split(axis.T, weights, vertices, min(count, blocks), block)
+    weights, axis = np.pad(weights, (0, spare)), np.pad(axis, ((0, 0), (0, spare)), mode="edge")
+    tiles = _split(axis.T, weights, np.arange(len(weights)), min(count, blocks), block)
     sizes = [len(tile) // block for tile in tiles]
     axes = [_towards(weights[tile] @ axis.T[tile]) for tile in tiles]
     return Tiling(
-        jnp.asarray(np.concatenate(tiles).reshape(-1, block).astype(np.int32)),
+        jnp.asarray(np.minimum(np.concatenate(tiles), last).reshape(-1, block).astype(np.int32)),
         jnp.asarray(np.repeat(np.arange(len(tiles), dtype=np.int32), sizes)),
         jnp.asarray(np.stack(axes), transfer.positions.dtype),
     )
@@ -131,15 +133,12 @@ def arrange(
     Other arguments and errors as for `make_tiles`; raises `ValueError` for a tiling of another
     mesh too.
     """
-    if directions < 1 or not exponent > 0:
-        raise ValueError(
-            f"expected directions of at least 1 and exponent above 0, got {directions}, {exponent}"
-        )
+    check_rule(directions, exponent)
     order, vertices = np.asarray(tiling.order), len(transfer.positions)
-    place = np.full(vertices, -1, np.int32)
-    place[order.ravel()] = np.arange(order.size, dtype=np.int32)
-    if order.max() >= vertices or place.min() < 0:
+    if order.max() + 1 != vertices:
         raise ValueError(f"expected a tiling of {vertices} vertices, got one of {order.max() + 1}")
+    place = np.zeros(vertices, np.int32)
+    place[order.ravel()] = np.arange(order.size, dtype=np.int32)
     dtype = transfer.positions.dtype
     rule = local_rule(transfer.degree, directions, float(exponent))
     return _arrange(transfer, tiling, jnp.asarray(place), *(jnp.asarray(a, dtype) for a in rule))

@@ -12,7 +12,7 @@ from ..transfer import Material, Transfer, shade_diffuse
 from ..transfer._checks import checked_eye, checked_light, checked_material
 from ..transfer._lobe import lobe, lobe_polynomial, mirrored
 from ..transfer._shade import tall_product
-from ._costs import product_cost, sum_cost
+from ._costs import full_cost, product_cost, sum_cost
 from ._result import AdaptiveResult
 from ._tile_sets import TileSet
 
@@ -36,15 +36,15 @@ def shade_tiles(
         S = ρ_s Σ_n L(ω_n) lobe(B·ω_n) (A O)_n,
 
     with weights A that make the most of them (`docs/adaptive_tiles.md`). No band of light,
-    transfer or lobe is dropped, and each vertex has its own B. There is no threshold, so nothing
-    pops from frame to frame; only where another tile set takes over does the error change at
-    once. The diffuse part is computed in full. Not in Lee & Kim 2014. Experiment
+    transfer or lobe is dropped, and each vertex has its own B. There is no threshold; the
+    error changes at once only where another tile set takes over. The diffuse part is computed in
+    full. Not in Lee & Kim 2014. Experiment
     `leekim2014.table1` prints what it gains.
 
     **Arguments**
 
     - `light`, `eye`, `material`, `distant`, `normalized`: as for `shade_glossy`; one light (3, K)
-      and one exponent.
+      of the transfer's degree, and one exponent.
     - `transfer`: what `tiles` was made of.
     - `tiles`: from `make_tiles`, or `TileAtlas.nearest`. An eye or an exponent other than those it
       was made for costs accuracy and no more.
@@ -94,6 +94,7 @@ def _shade_tiles(light, transfer, eye, material, tiles, distant, normalized):
     color = glossy * albedo + shade_diffuse(light, transfer, material.diffuse)
     degree = tiles.degree
     spent = product_cost("diffuse", 0, degree, degree) + sum_cost(degree, degree, directions)
+    spent += count * directions * 3 * width / len(tiles.place) / full_cost(degree)  # of the light
     return AdaptiveResult(color, {}, jnp.asarray(spent, color.dtype))
 
 

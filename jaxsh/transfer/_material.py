@@ -2,9 +2,15 @@
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from ..harmonics._checks import as_float, is_concrete
+
+
+def _as_strong(value: ArrayLike) -> Float[Array, "..."]:
+    """Of a type of its own, so that numbers and arrays run the same compiled programs."""
+    array = as_float(value)
+    return array.astype(array.dtype)
 
 
 class Material(eqx.Module):
@@ -17,9 +23,9 @@ class Material(eqx.Module):
     and >= 0, or an exponent not finite and above -1.
     """
 
-    diffuse: Float[Array, "..."] = eqx.field(converter=as_float)
-    specular: Float[Array, "..."] = eqx.field(converter=as_float)
-    exponent: Float[Array, "..."] = eqx.field(converter=as_float)
+    diffuse: Float[Array, "..."] = eqx.field(converter=_as_strong)
+    specular: Float[Array, "..."] = eqx.field(converter=_as_strong)
+    exponent: Float[Array, "..."] = eqx.field(converter=_as_strong)
 
     def __check_init__(self):
         for name in ("diffuse", "specular"):

@@ -9,6 +9,7 @@ from jaxsh.adaptive import _local_rule, _tiles
 from jaxsh.adaptive._tile_atlas import TileFollower, make_tile_atlas
 from jaxsh.adaptive._tile_sets import Tiling, arrange, make_tiles, make_tiling
 from jaxsh.adaptive._tiles import shade_tiles
+from jaxsh.transfer._lobe import reflected
 from jaxsh.transfer._nodes import product_nodes
 
 COUNT, DEGREE = 300, 3
@@ -53,6 +54,46 @@ def test_tiles_are_exact_in_exact_directions(ball, light, dtype, tolerance):
     assert result.color.dtype == dtype
     full = transfer.shade_glossy(light, ball, eye, material)
     np.testing.assert_allclose(result.color, full, atol=tolerance)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "tolerance"), [(jnp.float32, 2e-6), (jnp.float64, 1e-14)], ids=["float32", "float64"]
+)
+def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolerance):
+    """Degree 4, 48 of its 74 directions; tile by tile by hand, for two eyes."""
+    degree, exponent, count = 4, 16.0, 70
+    normals = sphere.fibonacci(count).directions.at[3].set(jnp.nan)
+    rows = rng.normal(size=(2, count, 25))
+    made = transfer.Transfer(
+        jnp.asarray(rows[0]), normals, normals, jnp.zeros((count, 1), jnp.int32)
+    )
+    made = eqx.tree_at(lambda t: t.positions, made, jnp.nan_to_num(normals))
+    light, material = jnp.asarray(rng.normal(size=(3, 25))), transfer.Material(0.0, 1.0, exponent)
+    tiles = make_tiles(made, EYE, count=3, block=16, exponent=exponent)
+    eyes = jnp.asarray([EYE, EYE + 0.2])
+    cast_ = [cast(x, dtype) for x in (light, made, eyes, material, tiles)]
+
+    def color(eye):
+        return shade_tiles(cast_[0], cast_[1], eye, *cast_[3:]).color
+
+    ours = jax.vmap(color)(cast_[2])
+    lobe = np.asarray(harmonics.phong(exponent, degree, normalized=True))
+    lobe = lobe * np.sqrt((2 * np.arange(degree + 1) + 1) / (4 * np.pi))
+    rule = _local_rule.local_rule(degree, 48, exponent)
+    samples = np.asarray(tiles.samples)
+    for eye, got in zip(eyes, np.asarray(ours), strict=True):
+        axis = np.asarray(reflected(eye, made.positions, made.normals, False)).T
+        for tile, pole in enumerate(tiles.tiling.axes):
+            at = np.asarray(tiles.directions[tile])
+            np.testing.assert_allclose(at @ pole, rule.directions[:, 2], atol=1e-12)
+            lights = np.asarray(harmonics.evaluate(at, degree) @ light.T)
+            for block in np.flatnonzero(np.asarray(tiles.tiling.tile) == tile):
+                members = np.asarray(tiles.tiling.order)[block]
+                lobes = np.polynomial.legendre.legval(axis[members] @ at.T, lobe)
+                expected = (lobes * samples[block].T) @ lights
+                np.testing.assert_allclose(
+                    got[members], expected, atol=tolerance * np.abs(ours).max()
+                )
 
 
 def test_tiles_with_albedos_per_vertex(ball, light, rng):
@@ -177,13 +218,16 @@ def test_tiling_holds_each_vertex(ball, count, block):
 
 
 def test_atlas_takes_the_nearest_view(ball):
-    atlas = make_tile_atlas(ball, distance=3.0, views=5, count=4, block=32)
+    atlas = make_tile_atlas(
+        ball, distance=3.0, views=5, count=4, block=32, directions=7, exponent=9.0
+    )
     for view in (0, 3):
         eye = atlas.centre + 2.5 * atlas.eyes[view]
         assert atlas.view(eye) == view
     eye = atlas.centre + 3.0 * atlas.eyes[3]
     expected = make_tiling(ball, eye, count=4, block=32)
-    np.testing.assert_array_equal(atlas.nearest(ball, eye).tiling.order, expected.order)
+    expected = arrange(ball, expected, directions=7, exponent=9.0)
+    jax.tree.map(np.testing.assert_array_equal, atlas.nearest(ball, eye), expected)
 
 
 def test_follower_arrives_at_the_nearest_view(ball):
@@ -213,8 +257,15 @@ def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
         arrange(ball, Tiling(other.tiling.order, other.tiling.tile, other.tiling.axes))
     with pytest.raises(ValueError, match="light of the tiles' degree"):
         shade_tiles(light[:, :9], ball, EYE, MATERIAL, tiles)
-    with pytest.raises(ValueError, match="directions of at least 1"):
-        make_tiles(ball, EYE, directions=0)
+    with pytest.raises(ValueError, match="expected a tiling of 100"):
+        arrange(jax.tree.map(lambda x: x[:100] % 100, ball), tiles.tiling)
+    for wrong in ({"directions": 0}, {"exponent": -1.0}, {"exponent": float("nan")}):
+        with pytest.raises(ValueError, match="directions of at least 1"):
+            make_tiles(ball, EYE, **wrong)
+        with pytest.raises(ValueError, match="directions of at least 1"):
+            make_tile_atlas(ball, **wrong)
+    with pytest.raises(ValueError, match="a view from 0 to 1, got 2"):
+        make_tile_atlas(ball, views=2, count=2).tiling(2)
     with pytest.raises(ValueError, match="at least 1"):
         make_tiles(ball, EYE, count=0)
     with pytest.raises(ValueError, match="eye"):
