@@ -26,8 +26,10 @@ def reflected(
     an eye on the vertex itself is taken to be straight above it.
     """
     # Once, where XLA would take rows out of columns again for each component of what follows.
-    rows = fenced(lambda positions, normals: (positions.T, unit(normals.T)), positions, normals)
-    return mirrored(eye, *rows, distant)
+    rows, units = fenced(
+        lambda positions, normals: (positions.T, unit(normals.T)), positions, normals
+    )
+    return mirrored(eye, rows, units, distant)
 
 
 def mirrored(
