@@ -25,7 +25,8 @@ from ._tile_sets import (
 class TileAtlas(eqx.Module):
     """Tilings of one mesh for eyes all around it. Made by `make_tile_atlas`.
 
-    Indices alone, 4 bytes a vertex and view; the transfer is put in a view's order when needed.
+    Indices and each tile's axis, 4 bytes a vertex and view; the transfer is put in a view's order,
+    and sampled, when needed.
     """
 
     order: Int[Array, "views blocks b"]

@@ -97,8 +97,8 @@ def make_tiling(
 
     A tile costs Σ area·(max(n·ω_o, 0) + 0.05)·|B - B̄|⁶, and is split at the middle of its extent
     along its longest axis. Where there are fewer blocks than `count`, each is a tile. Arguments
-    and errors as for `make_tiles`, whose own these are; `areas` of the vertices, relative to their
-    mean, where they are known already.
+    and errors as for `make_tiles`; `areas` of the vertices, relative to their mean, where they are
+    known already.
     """
     if count < 1 or block < 1:
         raise ValueError(f"expected count and block of at least 1, got {count} and {block}")
@@ -135,10 +135,11 @@ def arrange(
     """
     check_rule(directions, exponent)
     order, vertices = np.asarray(tiling.order), len(transfer.positions)
-    if order.max() + 1 != vertices:
-        raise ValueError(f"expected a tiling of {vertices} vertices, got one of {order.max() + 1}")
-    place = np.zeros(vertices, np.int32)
+    place = np.full(max(vertices, order.max() + 1), -1, np.int32)
     place[order.ravel()] = np.arange(order.size, dtype=np.int32)
+    if len(place) != vertices or place.min() < 0:
+        held = np.count_nonzero(place >= 0)
+        raise ValueError(f"expected a tiling of {vertices} vertices, got one of {held}")
     dtype = transfer.positions.dtype
     rule = local_rule(transfer.degree, directions, float(exponent))
     return _arrange(transfer, tiling, jnp.asarray(place), *(jnp.asarray(a, dtype) for a in rule))

@@ -49,5 +49,5 @@ def checked_eye(eye: Float[ArrayLike, "..."], dtype: jnp.dtype) -> Float[Array, 
 
 
 def _cast(array: Array, dtype: jnp.dtype) -> Array:
-    # To cast to the same type does nothing, but takes 50 µs of a frame.
+    # To cast to the same type does nothing, but takes time of every frame.
     return array if array.dtype == dtype else array.astype(dtype)

@@ -257,7 +257,12 @@ def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
         arrange(ball, Tiling(other.tiling.order, other.tiling.tile, other.tiling.axes))
     with pytest.raises(ValueError, match="light of the tiles' degree"):
         shade_tiles(light[:, :9], ball, EYE, MATERIAL, tiles)
-    with pytest.raises(ValueError, match="expected a tiling of 100"):
+    twice = Tiling(
+        tiles.tiling.order.at[0].set(tiles.tiling.order[1]), tiles.tiling.tile, tiles.tiling.axes
+    )
+    with pytest.raises(ValueError, match="expected a tiling of 300 vertices, got one of 2"):
+        arrange(ball, twice)
+    with pytest.raises(ValueError, match="expected a tiling of 100 vertices, got one of 300"):
         arrange(jax.tree.map(lambda x: x[:100] % 100, ball), tiles.tiling)
     for wrong in ({"directions": 0}, {"exponent": -1.0}, {"exponent": float("nan")}):
         with pytest.raises(ValueError, match="directions of at least 1"):
