@@ -5,25 +5,44 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from numpy.polynomial.legendre import legval
+from numpy.polynomial.chebyshev import chebpts1
+from numpy.polynomial.legendre import legval, legvander
+from numpy.polynomial.polynomial import polyval
 
 from ..harmonics import degrees, phong
+from ..sphere import fibonacci
 from ..transfer._nodes import product_nodes
 
 # How far from the pole lobes may point, in radians: half a tile's width, and how far an eye goes
 # before it takes other tiles.
-_REACH = 0.3
+_REACH = 0.2
 # What is expected of band l of light and transfer, as amplitudes: 1/(1 + l) to these powers.
-_LIGHT, _TRANSFER = 1, 2
+_LIGHT, _TRANSFER = 0.5, 2
 # Of the largest variance, added to each, so that nearly equal directions do not cancel.
 _RIDGE = 1e-7
+# Directions to choose from, over the sphere.
+_CANDIDATES = 1500
+# How often each choice is looked at again.
+_SWEEPS = 2
+# Of the lobe's peak: what an economized lobe may be off.
+_NEGLIGIBLE = 0.005
 
 
 class LocalRule(NamedTuple):
-    """∫ L O lobe(B·ω) dω ≈ Σ_n L(ω_n) lobe(B·ω_n) (A O)_n, for B within 0.3 of the pole +z."""
+    """∫ L O lobe(B·ω) dω ≈ Σ_n L(ω_n) lobe(B·ω_n) (A O)_n, for B within 0.2 of the pole +z.
+
+    And the lobe with as few terms as it needs there: Σ_j p_j (t - t̄)^j of t = B·ω_n, no further
+    down than `lowest`, where p are `powers` times its zonal coefficients and t̄ is `middle`.
+    """
 
     directions: Float[np.ndarray, "n 3"]
     rows: Float[np.ndarray, "n k"]  # A
+    powers: Float[np.ndarray, "terms bands"]
+    lowest: float
+
+    @property
+    def middle(self) -> float:
+        return (1 + self.lowest) / 2
 
 
 @functools.lru_cache(maxsize=32)
@@ -43,13 +62,40 @@ def local_rule(degree: int, count: int, exponent: float) -> LocalRule:
     """
     nodes = product_nodes(degree)
     if len(nodes.directions) <= count:
-        return LocalRule(nodes.directions, nodes.project.T)
-    covariance = _covariance(nodes.directions, degree, exponent)
-    cross = covariance @ nodes.project.T
-    importance = (1.0 + degrees(degree)) ** (-2.0 * _TRANSFER)
-    chosen = _greedy(covariance, cross, importance, count)
-    inner = covariance[np.ix_(chosen, chosen)] + _RIDGE * np.eye(count)
-    return LocalRule(nodes.directions[chosen], np.linalg.solve(inner, cross[chosen]))
+        return LocalRule(nodes.directions, nodes.project.T, _powers(degree, -1.0, degree + 1), -1.0)
+    candidates = np.asarray(fibonacci(_CANDIDATES).directions, np.float64)
+    covariance = _covariance(candidates, candidates, degree, exponent)
+    cross = _covariance(candidates, nodes.directions, degree, exponent) @ nodes.project.T
+    covariance, cross = covariance / covariance.max(), cross / covariance.max()
+    chosen = _choose(covariance, cross, (1.0 + degrees(degree)) ** (-2.0 * _TRANSFER), count)
+    directions, rows = candidates[chosen], _estimate(covariance, chosen, cross)
+    outermost = np.arccos(np.clip(directions[:, 2], -1, 1)).max()
+    lowest = float(np.cos(min(outermost + _REACH / 2, np.pi)))
+    return LocalRule(directions, rows, _economized(degree, exponent, lowest), lowest)
+
+
+def _economized(degree: int, exponent: float, lowest: float) -> Float[np.ndarray, "terms bands"]:
+    """`_powers` of as few terms as a lobe of this exponent needs."""
+    zonal = np.asarray(phong(exponent, degree), np.float64)
+    t = np.cos(np.linspace(0, np.arccos(lowest), 200)) - (1 + lowest) / 2
+    exact = polyval(t, _powers(degree, lowest, degree + 1) @ zonal)
+    for terms in range(1, degree + 1):
+        powers = _powers(degree, lowest, terms)
+        if np.abs(polyval(t, powers @ zonal) - exact).max() <= _NEGLIGIBLE * np.abs(exact).max():
+            return powers
+    return _powers(degree, lowest, degree + 1)
+
+
+def _powers(degree: int, lowest: float, terms: int) -> Float[np.ndarray, "terms bands"]:
+    """y_l0 between `lowest` and 1, in powers of t - t̄: interpolated in Chebyshev's points."""
+    half = (1 - lowest) / 2
+    points = chebpts1(terms)
+    harmonics = np.sqrt((2 * np.arange(degree + 1) + 1) / (4 * np.pi)) * legvander(
+        (1 + lowest) / 2 + half * points, degree
+    )
+    return np.linalg.solve(np.vander(points, increasing=True), harmonics) / (
+        half ** np.arange(terms)[:, None]
+    )
 
 
 def check_rule(count: int, exponent: float) -> None:
@@ -59,14 +105,16 @@ def check_rule(count: int, exponent: float) -> None:
         )
 
 
-def _covariance(directions, degree: int, exponent: float) -> Float[np.ndarray, "n n"]:
-    """Of light times lobe, the largest variance 1."""
+def _covariance(left, right, degree: int, exponent: float) -> Float[np.ndarray, "m n"]:
+    """Of light times lobe, between directions."""
     bands = np.arange(degree + 1)
     lights = (2 * bands + 1) / (4 * np.pi) * (1.0 + bands) ** (-2.0 * _LIGHT)
     lobes = np.asarray(phong(exponent, degree), np.float64) * np.sqrt((2 * bands + 1) / (4 * np.pi))
-    values = legval(np.clip(directions @ _poles().T, -1, 1), lobes)
-    covariance = legval(np.clip(directions @ directions.T, -1, 1), lights) * (values @ values.T)
-    return covariance / covariance.max()
+    poles = _poles().T
+    products = (
+        legval(np.clip(left @ poles, -1, 1), lobes) @ legval(np.clip(right @ poles, -1, 1), lobes).T
+    )
+    return legval(np.clip(left @ right.T, -1, 1), lights) * products
 
 
 def _poles(count: int = 64) -> Float[np.ndarray, "b 3"]:
@@ -77,17 +125,22 @@ def _poles(count: int = 64) -> Float[np.ndarray, "b 3"]:
     return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(polar)], axis=-1)
 
 
-def _greedy(covariance, cross, importance, count: int) -> list[int]:
-    """Directions, each of which lowers Σ importance · error most, given those before."""
-    chosen = []
-    for _ in range(count):
-        variance = np.maximum(covariance.diagonal(), 1e-12)
-        gain = np.square(cross) @ importance / variance
+def _choose(covariance, cross, importance, count: int) -> list[int]:
+    """Of candidates those that lower Σ importance · error most, given the others."""
+    chosen: list[int] = []
+    for step in range(count * (1 + _SWEEPS)):
+        if step >= count:
+            chosen.pop(0)
+        known = _estimate(covariance, chosen, covariance)
+        left = cross - known.T @ cross[chosen]
+        variance = covariance.diagonal() - np.sum(known * covariance[chosen], axis=0)
+        gain = np.square(left) @ importance / np.maximum(variance, 1e-12)
         gain[chosen] = -1
-        best = int(np.argmax(gain))
-        chosen.append(best)
-        # What the value there tells of all others is known from now on.
-        share = covariance[:, best] / variance[best]
-        cross = cross - np.outer(share, cross[best])
-        covariance = covariance - np.outer(share, covariance[best])
+        chosen.append(int(np.argmax(gain)))
     return chosen
+
+
+def _estimate(covariance, chosen: list[int], cross) -> Float[np.ndarray, "n k"]:
+    """Of what has the covariances `cross` with all, the weights of the values at those chosen."""
+    inner = covariance[np.ix_(chosen, chosen)] + _RIDGE * np.eye(len(chosen))
+    return np.linalg.solve(inner, cross[chosen])

@@ -12,6 +12,7 @@ from ..transfer._checks import checked_eye
 from ._local_rule import check_rule
 from ._tile_sets import (
     BLOCK,
+    COUNT,
     DIRECTIONS,
     EXPONENT,
     TileSet,
@@ -62,7 +63,7 @@ def make_tile_atlas(
     *,
     distance: float | None = None,
     views: int = 128,
-    count: int = 96,
+    count: int = COUNT,
     block: int = BLOCK,
     directions: int = DIRECTIONS,
     exponent: float = EXPONENT,

@@ -1,22 +1,25 @@
 """Which vertices share a tile: those that mirror the eye into nearly the same direction."""
 
+import functools
 import heapq
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float, Int
+from jaxtyping import Array, ArrayLike, Float, Int, Int8
 
 from ..harmonics import degree_of, evaluate, rotate
 from ..transfer import Transfer
 from ..transfer._checks import checked_eye
-from ..transfer._lobe import reflected, unit
-from ._local_rule import check_rule, local_rule
+from ..transfer._lobe import reflected, rows_of, unit
+from ..transfer._quantized import in_steps
+from ._local_rule import LocalRule, check_rule, local_rule
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 128
-DIRECTIONS = 48
+DIRECTIONS = 40
+COUNT = 128
 EXPONENT = 32.0
 
 
@@ -42,15 +45,18 @@ class TileSet(eqx.Module):
 
     tiling: Tiling
     place: Int[Array, " v"]  # where in `order` each vertex is
-    samples: Float[Array, "blocks n b"]  # of the transfer, in the directions of each tile
+    samples: Int8[Array, "blocks n b"] | Float[Array, "blocks n b"]
+    steps: Float[Array, "blocks n"]  # what samples count: of transfer, in each tile's directions
     directions: Float[Array, "tiles n 3"]
-    basis: Float[Array, "tiles n k"]  # there
+    basis: Float[Array, "k tiles n"]  # there
+    powers: Float[Array, "terms bands"]  # of the lobe around them, as `LocalRule` has it
+    lowest: Float[Array, ""]
     positions: Float[Array, "3 places"]
     normals: Float[Array, "3 places"]  # at unit length
 
     @property
     def degree(self) -> int:
-        return degree_of(self.basis.shape[-1])
+        return degree_of(len(self.basis))
 
 
 def make_tiles(
@@ -58,10 +64,11 @@ def make_tiles(
     eye: Float[ArrayLike, " 3"],
     *,
     distant: bool = False,
-    count: int = 96,
+    count: int = COUNT,
     block: int = BLOCK,
     directions: int = DIRECTIONS,
     exponent: float = EXPONENT,
+    quantized: bool = True,
 ) -> TileSet:
     """Tiles for the view from `eye`: the transfer regrouped, and sampled, by reflected direction.
 
@@ -74,6 +81,7 @@ def make_tiles(
     - `directions`: of each tile. More are more exact, and cost more per frame; as many as
       `transfer.sample` takes leave no error.
     - `exponent`: of the lobes to come. Others are less exact.
+    - `quantized`: whether samples are rounded to eight bits, which the error does not show.
 
     Takes `directions` numbers a vertex. Neither traceable nor differentiable; raises `ValueError`
     for an eye that is no vector, for a count, block or directions below 1, and for an exponent
@@ -81,7 +89,7 @@ def make_tiles(
     """
     check_rule(directions, exponent)
     tiling = make_tiling(transfer, eye, distant=distant, count=count, block=block)
-    return arrange(transfer, tiling, directions=directions, exponent=exponent)
+    return arrange(transfer, tiling, directions=directions, exponent=exponent, quantized=quantized)
 
 
 def make_tiling(
@@ -89,7 +97,7 @@ def make_tiling(
     eye: Float[ArrayLike, " 3"],
     *,
     distant: bool = False,
-    count: int = 96,
+    count: int = COUNT,
     block: int = BLOCK,
     areas: Float[ArrayLike, " v"] | None = None,
 ) -> Tiling:
@@ -127,6 +135,7 @@ def arrange(
     *,
     directions: int = DIRECTIONS,
     exponent: float = EXPONENT,
+    quantized: bool = True,
 ) -> TileSet:
     """The transfer in the order of a tiling, in directions about each tile's own.
 
@@ -142,25 +151,28 @@ def arrange(
         raise ValueError(f"expected a tiling of {vertices} vertices, got one of {held}")
     dtype = transfer.positions.dtype
     rule = local_rule(transfer.degree, directions, float(exponent))
-    return _arrange(transfer, tiling, jnp.asarray(place), *(jnp.asarray(a, dtype) for a in rule))
+    rule = LocalRule(*(jnp.asarray(part, dtype) for part in rule))
+    return _arrange(transfer, tiling, jnp.asarray(place), rule, quantized)
 
 
-@jax.jit
-def _arrange(transfer, tiling, place, directions, rows):
+@functools.partial(jax.jit, static_argnames="quantized")
+def _arrange(transfer, tiling, place, rule, quantized):
     turns = _turns(tiling.axes)
-    directions = jnp.matmul(directions[None], jnp.swapaxes(turns, 1, 2), precision="highest")
-    rows = rotate(rows, turns[:, None])
+    directions = jnp.matmul(rule.directions[None], jnp.swapaxes(turns, 1, 2), precision="highest")
+    rows = rotate(rule.rows, turns[:, None])
 
     def sampled(part):
         vertices, tile = part
         coefficients = transfer.coefficients.at[vertices].get(mode="promise_in_bounds")
-        return jnp.matmul(rows[tile], coefficients.T, precision="highest")
+        samples = jnp.matmul(rows[tile], coefficients.T, precision="highest")
+        return in_steps(samples, 1) if quantized else (samples, jnp.ones_like(samples[:, 0]))
 
-    samples = jax.lax.map(sampled, (tiling.order, tiling.tile))
-    basis = evaluate(directions, transfer.degree)
+    samples, steps = jax.lax.map(sampled, (tiling.order, tiling.tile))
+    basis = evaluate(directions, transfer.degree, axis=0)
     order = tiling.order.reshape(-1)
-    positions, normals = transfer.positions[order].T, unit(transfer.normals[order].T)
-    return TileSet(tiling, place, samples, directions, basis, positions, normals)
+    receivers = rows_of(transfer.positions[order], transfer.normals[order])
+    near = rule.powers, rule.lowest
+    return TileSet(tiling, place, samples, steps, directions, basis, *near, *receivers)
 
 
 def _turns(axes: Float[Array, "tiles 3"]) -> Float[Array, "tiles 3 3"]:

@@ -4,14 +4,14 @@ import functools
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import ArrayLike, Float
 
-from ..harmonics import degree_of
+from ..harmonics import degree_of, phong
 from ..harmonics._fence import fenced
-from ..transfer import Material, Transfer, shade_diffuse
+from ..transfer import Material, QuantizedTransfer, Transfer, shade_diffuse
+from ..transfer._block_sums import block_sums
 from ..transfer._checks import checked_eye, checked_light, checked_material
-from ..transfer._lobe import lobe, lobe_polynomial, mirrored
-from ..transfer._shade import tall_product
+from ..transfer._lobe import mirrored
 from ._costs import full_cost, product_cost, sum_cost
 from ._result import AdaptiveResult
 from ._tile_sets import TileSet
@@ -19,7 +19,7 @@ from ._tile_sets import TileSet
 
 def shade_tiles(
     light: Float[ArrayLike, "3 k"],
-    transfer: Transfer,
+    transfer: Transfer | QuantizedTransfer,
     eye: Float[ArrayLike, " 3"],
     material: Material,
     tiles: TileSet,
@@ -45,7 +45,8 @@ def shade_tiles(
 
     - `light`, `eye`, `material`, `distant`, `normalized`: as for `shade_glossy`; one light (3, K)
       of the transfer's degree, and one exponent.
-    - `transfer`: what `tiles` was made of.
+    - `transfer`: what `tiles` was made of, for the diffuse part; faster where `quantize` made
+      eight bits of it.
     - `tiles`: from `make_tiles`, or `TileAtlas.nearest`. An eye or an exponent other than those it
       was made for costs accuracy and no more.
 
@@ -55,7 +56,7 @@ def shade_tiles(
 
     Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
     """
-    count, dtype = len(transfer.positions), transfer.positions.dtype
+    count, dtype = transfer.count, tiles.basis.dtype
     if tiles.place.shape != (count,) or tiles.degree != transfer.degree:
         raise ValueError(
             f"expected tiles of {count} vertices and degree {transfer.degree}, got "
@@ -78,16 +79,19 @@ def shade_tiles(
 @functools.partial(jax.jit, static_argnames=("distant", "normalized"))
 def _shade_tiles(light, transfer, eye, material, tiles, distant, normalized):
     tile, (blocks, size) = tiles.tiling.tile, tiles.tiling.order.shape
-    count, directions, width = tiles.basis.shape
-    lights = tall_product(tiles.basis.reshape(-1, width), light)
-    weights = jnp.swapaxes(lights.reshape(count, directions, 3), 1, 2)
+    width, count, directions = tiles.basis.shape
+    basis = tiles.basis.reshape(width, -1)
+    lights = jnp.matmul(light, basis, precision="highest").reshape(3, count, directions)
+    weights = jnp.swapaxes(lights, 0, 1)[tile] * tiles.steps[:, None]
 
     axis = mirrored(eye, tiles.positions, tiles.normals, distant).reshape(3, blocks, 1, size)
-    lobes = lobe_polynomial(material.exponent, tiles.degree, normalized).reshape(-1, 1, 1, 1)
-    values = fenced(_lobed, axis, tiles.directions[tile], lobes, tiles.samples)
-    glossy = fenced(weighted_sums, weights[tile], values)
-    glossy = jnp.swapaxes(glossy, 1, 2).reshape(-1, 3)
-    glossy = glossy.at[tiles.place].get(mode="promise_in_bounds")
+    zonal = phong(material.exponent, tiles.degree, normalized=normalized)
+    lobe = jnp.matmul(tiles.powers, zonal, precision="highest")
+    values = fenced(_lobed, axis, tiles.directions[tile], lobe, tiles.lowest, tiles.samples)
+    glossy = fenced(block_sums, weights, values)
+    # Rows of four, since a gather of three takes one number at a time.
+    glossy = jnp.pad(jnp.swapaxes(glossy, 1, 2), ((0, 0), (0, 0), (0, 1))).reshape(-1, 4)
+    glossy = glossy.at[tiles.place].get(mode="promise_in_bounds")[:, :3]
 
     albedo = material.specular
     albedo = albedo if albedo.ndim == 2 else albedo.reshape(1, -1)
@@ -98,37 +102,7 @@ def _shade_tiles(light, transfer, eye, material, tiles, distant, normalized):
     return AdaptiveResult(color, {}, jnp.asarray(spent, color.dtype))
 
 
-def _lobed(axis, directions, lobes, samples):
+def _lobed(axis, directions, lobe, lowest, samples):
     x, y, z = (directions[..., i, None] for i in range(3))
-    return samples * lobe(x * axis[0] + y * axis[1] + z * axis[2], lobes)
-
-
-@jax.custom_jvp
-def weighted_sums(
-    weights: Float[Array, "blocks r n"], values: Float[Array, "blocks n b"]
-) -> Float[Array, "blocks r b"]:
-    """Σ_n w_rn f_nv for each vertex v of each block.
-
-    XLA's CPU backend multiplies so many narrow matrices one after the other on one core, and each
-    is copied first. With the sum over n written out the whole is one loop over vertices, which it
-    vectorises and splits over the cores.
-    """
-    return jax.lax.platform_dependent(weights, values, cpu=_written_out, default=_as_matrices)
-
-
-@weighted_sums.defjvp
-def _weighted_sums_jvp(primals, tangents):
-    # The written-out sum would be transposed term by term.
-    _, change = jax.jvp(_as_matrices, primals, tangents)
-    return weighted_sums(*primals), change
-
-
-def _written_out(weights, values):
-    total = jnp.zeros((len(values), weights.shape[1], values.shape[2]), values.dtype)
-    for n in range(values.shape[1]):
-        total = total + weights[:, :, n, None] * values[:, n, None]
-    return total
-
-
-def _as_matrices(weights, values):
-    return jnp.matmul(weights, values, precision="highest")
+    t = jnp.maximum(x * axis[0] + y * axis[1] + z * axis[2], lowest) - (1 + lowest) / 2
+    return samples.astype(t.dtype) * functools.reduce(lambda value, c: value * t + c, lobe[::-1])

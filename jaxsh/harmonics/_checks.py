@@ -10,7 +10,8 @@ from jaxtyping import Array, ArrayLike, Float
 
 def as_float(value: ArrayLike) -> Float[Array, "..."]:
     """As a floating-point JAX array; integers become JAX's default float."""
-    array = jnp.asarray(value)
+    # What is a JAX array already is looked at in every frame.
+    array = value if isinstance(value, Array) else jnp.asarray(value)
     if jnp.issubdtype(array.dtype, jnp.floating):
         return array
     if jnp.issubdtype(array.dtype, jnp.integer):

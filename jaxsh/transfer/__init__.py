@@ -10,6 +10,7 @@ from ._file import load, save
 from ._glossy import shade_glossy
 from ._light_product import LightProduct, light_product
 from ._material import Material
+from ._quantized import QuantizedTransfer, quantize
 from ._sampled import SampledTransfer, sample
 from ._shade import shade_diffuse
 from ._transfer import Transfer
@@ -18,12 +19,14 @@ __all__ = [
     "EyeProduct",
     "LightProduct",
     "Material",
+    "QuantizedTransfer",
     "SampledTransfer",
     "Transfer",
     "bake",
     "eye_product",
     "light_product",
     "load",
+    "quantize",
     "sample",
     "save",
     "shade_diffuse",

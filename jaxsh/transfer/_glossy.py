@@ -11,7 +11,7 @@ from ..harmonics import degree_of
 from ..harmonics._checks import align
 from ._checks import checked_eye, checked_light, checked_material
 from ._light_product import LightProduct, seen
-from ._lobe import lobe_polynomial, reflected
+from ._lobe import lobe_polynomial, mirrored, reflected
 from ._lobe_products import lobe_products
 from ._material import Material
 from ._sampled import SampledTransfer
@@ -66,7 +66,8 @@ def shade_glossy(
     Raises `ValueError` for shapes that do not fit, and for a sampled transfer of another degree
     than the light's.
     """
-    count, dtype = len(transfer.positions), transfer.positions.dtype
+    held = transfer.irradiance if isinstance(transfer, LightProduct) else transfer.coefficients
+    count, dtype = held.shape[0], held.dtype
     eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
     if isinstance(transfer, LightProduct):
         if light is not None:
@@ -86,7 +87,8 @@ def shade_glossy(
 
 @functools.partial(jax.jit, static_argnames=("distant", "normalized"))
 def _shade_glossy(light, transfer, eye, material, distant, normalized):
-    axis = reflected(eye, transfer.positions, transfer.normals, distant)
+    mirror = reflected if isinstance(transfer, Transfer) else mirrored
+    axis = mirror(eye, transfer.positions, transfer.normals, distant)
     if light is None:
         glossy, irradiance = seen(transfer, axis, material.exponent, normalized)
     else:
@@ -99,7 +101,7 @@ def _shade_glossy(light, transfer, eye, material, distant, normalized):
 def _gather(light, transfer, axis, lobes):
     """What each vertex receives through its lobe, and over its hemisphere: (..., V, 3) both."""
     *batch, _, width = light.shape
-    count, coefficients = len(transfer.positions), transfer.coefficients[:, :width]
+    coefficients = transfer.coefficients[:, :width]
     if len(batch) and batch[-1] != 1:
         # A light of its own meets the product of transfer and lobe, which needs every harmonic.
         unit_lights = jnp.eye(width, dtype=light.dtype)
@@ -110,6 +112,6 @@ def _gather(light, transfer, axis, lobes):
     rows = light.reshape(math.prod(light.shape[:-1]), width)
     glossy = lobe_products(rows, transfer, axis, lobes).T
     return tuple(
-        jnp.moveaxis(product.reshape(count, *batch[:-1], 3), 0, -2)
+        jnp.moveaxis(product.reshape(-1, *batch[:-1], 3), 0, -2)
         for product in (glossy, tall_product(coefficients, rows))
     )

@@ -8,6 +8,7 @@ from jaxtyping import Array, ArrayLike, Float
 from ..harmonics import convolve, degree_of, evaluate, num_coefficients, phong, product_matrix
 from ._checks import checked_light
 from ._layout import in_tiles, out_of_tiles, rows_in_tiles
+from ._lobe import rows_of
 from ._transfer import Transfer
 
 
@@ -19,8 +20,8 @@ class LightProduct(eqx.Module):
 
     radiance: Float[Array, "tiles 3 k tile"]
     irradiance: Float[Array, "v 3"]
-    positions: Float[Array, "v 3"]
-    normals: Float[Array, "v 3"]
+    positions: Float[Array, "3 v"]
+    normals: Float[Array, "3 v"]  # at unit length
 
 
 def light_product(light: Float[ArrayLike, "3 k"], transfer: Transfer) -> LightProduct:
@@ -48,7 +49,7 @@ def _light_product(light, transfer):
 
     radiance, irradiance = jax.lax.map(tile, rows_in_tiles(transfer.coefficients[:, :width]))
     irradiance = out_of_tiles(irradiance, len(transfer.positions)).T
-    return LightProduct(radiance, irradiance, transfer.positions, transfer.normals)
+    return LightProduct(radiance, irradiance, *rows_of(transfer.positions, transfer.normals))
 
 
 def seen(

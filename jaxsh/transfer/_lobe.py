@@ -25,11 +25,16 @@ def reflected(
     Always a unit vector: a normal that is undefined counts as zero, which turns B into -ω_o, and
     an eye on the vertex itself is taken to be straight above it.
     """
+    return mirrored(eye, *rows_of(positions, normals), distant)
+
+
+@jax.jit
+def rows_of(
+    positions: Float[Array, "v 3"], normals: Float[Array, "v 3"]
+) -> tuple[Float[Array, "3 v"], Float[Array, "3 v"]]:
+    """What `mirrored` takes: components first, normals at unit length."""
     # Once, where XLA would take rows out of columns again for each component of what follows.
-    rows, units = fenced(
-        lambda positions, normals: (positions.T, unit(normals.T)), positions, normals
-    )
-    return mirrored(eye, rows, units, distant)
+    return fenced(lambda positions, normals: (positions.T, unit(normals.T)), positions, normals)
 
 
 def mirrored(
@@ -38,11 +43,36 @@ def mirrored(
     normals: Float[Array, "3 v"],
     distant: bool,
 ) -> Float[Array, "3 v"]:
-    """`reflected` of rows, for normals that `unit` gave."""
-    there = jnp.broadcast_to(eye[:, None], normals.shape) if distant else eye[:, None] - positions
-    towards = unit(jnp.where(jnp.all(there == 0, axis=0, keepdims=True), normals, there))
-    cosine = normals[0] * towards[0] + normals[1] * towards[1] + normals[2] * towards[2]
-    return (2 * cosine)[None] * normals - towards
+    """`reflected` of `rows_of`."""
+    if distant:
+        eye = unit(eye[:, None])[:, 0]
+
+    def towards(eye, positions, normals):
+        if distant:
+            return jnp.broadcast_to(eye[:, None], normals.shape)
+        there = eye[:, None] - positions
+        x, y, z = there == 0
+        return jnp.where((x & y & z)[None], normals, there)
+
+    def scales(eye, positions, normals):
+        there = towards(eye, positions, normals)
+        cosine = normals[0] * there[0] + normals[1] * there[1] + normals[2] * there[2]
+        inverse = jnp.ones_like(cosine) if distant else _inverse_length(*there)
+        return inverse, 2 * cosine * inverse
+
+    # These two are divisions and a root, which each component would take anew.
+    inverse, twice_cosine = fenced(scales, eye, positions, normals)
+    there = towards(eye, positions, normals)
+    return twice_cosine[None] * normals - inverse[None] * there
+
+
+def _inverse_length(x, y, z):
+    """Or zero; of any length, since the largest component is taken out."""
+    largest = jax.lax.stop_gradient(jnp.maximum(jnp.maximum(jnp.abs(x), jnp.abs(y)), jnp.abs(z)))
+    defined = largest > 0
+    scale = jnp.where(defined, 1 / jnp.where(defined, largest, 1.0), 0.0)
+    x, y, z = x * scale, y * scale, z * scale
+    return scale * jnp.sqrt(1 / jnp.where(defined, x * x + y * y + z * z, 1.0))
 
 
 def lobe_polynomial(
@@ -70,8 +100,8 @@ def lobe(t: Float[Array, "..."], polynomial: Float[Array, "bands ..."]) -> Float
 
 def unit(vectors: Float[Array, "3 v"]) -> Float[Array, "3 v"]:
     """At unit length, or zero where there is no direction."""
-    x, y, z = vectors
-    defined = (jnp.isfinite(vectors).all(axis=0) & ((x != 0) | (y != 0) | (z != 0)))[None]
+    (x, y, z), (a, b, c) = vectors != 0, jnp.isfinite(vectors)
+    defined = ((x | y | z) & a & b & c)[None]
     unit, _ = normalize(jnp.where(defined, vectors, 1.0)[:, None])
     return jnp.where(defined, unit[:, 0], 0.0)
 

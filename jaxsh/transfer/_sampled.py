@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..harmonics._indexing import check_degree
+from ._lobe import rows_of
 from ._nodes import node_passes
 from ._transfer import Transfer
 
@@ -23,8 +24,8 @@ class SampledTransfer(eqx.Module):
 
     samples: Float[Array, "passes n v"]
     coefficients: Float[Array, "v k"]
-    positions: Float[Array, "v 3"]
-    normals: Float[Array, "v 3"]
+    positions: Float[Array, "3 v"]
+    normals: Float[Array, "3 v"]  # at unit length
     degree: int = eqx.field(static=True)
 
 
@@ -41,7 +42,9 @@ def sample(transfer: Transfer, degree: int | None = None) -> SampledTransfer:
         )
     coefficients = transfer.coefficients[:, : (degree + 1) ** 2]
     samples = _sample(coefficients, degree)
-    return SampledTransfer(samples, coefficients, transfer.positions, transfer.normals, degree)
+    return SampledTransfer(
+        samples, coefficients, *rows_of(transfer.positions, transfer.normals), degree
+    )
 
 
 @functools.partial(jax.jit, static_argnums=1)

@@ -22,5 +22,10 @@ class Transfer(eqx.Module):
     neighbors: Int[Array, "v n"]
 
     @property
+    def count(self) -> int:
+        """V."""
+        return self.coefficients.shape[0]
+
+    @property
     def degree(self) -> int:
         return degree_of(self.coefficients.shape[-1])

@@ -48,7 +48,7 @@ def test_tiles_are_exact_in_exact_directions(ball, light, dtype, tolerance):
     """At degree 3 there are 38, fewer than are taken."""
     ball, light, material = cast((ball, light, MATERIAL), dtype)
     eye = jnp.asarray(EYE, dtype)
-    tiles = make_tiles(ball, eye, count=5, block=16)
+    tiles = make_tiles(ball, eye, count=5, block=16, quantized=False)
     assert tiles.samples.shape[1] == 38
     result = shade_tiles(light, ball, eye, material, tiles)
     assert result.color.dtype == dtype
@@ -60,7 +60,7 @@ def test_tiles_are_exact_in_exact_directions(ball, light, dtype, tolerance):
     ("dtype", "tolerance"), [(jnp.float32, 2e-6), (jnp.float64, 1e-14)], ids=["float32", "float64"]
 )
 def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolerance):
-    """Degree 4, 48 of its 74 directions; tile by tile by hand, for two eyes."""
+    """Degree 4, 40 of its 74 directions; tile by tile by hand, for two eyes."""
     degree, exponent, count = 4, 16.0, 70
     normals = sphere.fibonacci(count).directions.at[3].set(jnp.nan)
     rows = rng.normal(size=(2, count, 25))
@@ -69,7 +69,7 @@ def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolera
     )
     made = eqx.tree_at(lambda t: t.positions, made, jnp.nan_to_num(normals))
     light, material = jnp.asarray(rng.normal(size=(3, 25))), transfer.Material(0.0, 1.0, exponent)
-    tiles = make_tiles(made, EYE, count=3, block=16, exponent=exponent)
+    tiles = make_tiles(made, EYE, count=3, block=16, exponent=exponent, quantized=False)
     eyes = jnp.asarray([EYE, EYE + 0.2])
     cast_ = [cast(x, dtype) for x in (light, made, eyes, material, tiles)]
 
@@ -77,9 +77,8 @@ def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolera
         return shade_tiles(cast_[0], cast_[1], eye, *cast_[3:]).color
 
     ours = jax.vmap(color)(cast_[2])
-    lobe = np.asarray(harmonics.phong(exponent, degree, normalized=True))
-    lobe = lobe * np.sqrt((2 * np.arange(degree + 1) + 1) / (4 * np.pi))
-    rule = _local_rule.local_rule(degree, 48, exponent)
+    rule = _local_rule.local_rule(degree, 40, exponent)
+    lobe = rule.powers @ np.asarray(harmonics.phong(exponent, degree, normalized=True))
     samples = np.asarray(tiles.samples)
     for eye, got in zip(eyes, np.asarray(ours), strict=True):
         axis = np.asarray(reflected(eye, made.positions, made.normals, False)).T
@@ -89,7 +88,8 @@ def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolera
             lights = np.asarray(harmonics.evaluate(at, degree) @ light.T)
             for block in np.flatnonzero(np.asarray(tiles.tiling.tile) == tile):
                 members = np.asarray(tiles.tiling.order)[block]
-                lobes = np.polynomial.legendre.legval(axis[members] @ at.T, lobe)
+                cosines = np.maximum(axis[members] @ at.T, rule.lowest)
+                lobes = np.polynomial.polynomial.polyval(cosines - rule.middle, lobe)
                 expected = (lobes * samples[block].T) @ lights
                 np.testing.assert_allclose(
                     got[members], expected, atol=tolerance * np.abs(ours).max()
@@ -99,7 +99,7 @@ def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolera
 def test_tiles_with_albedos_per_vertex(ball, light, rng):
     albedos = [jnp.asarray(rng.uniform(size=(COUNT, channels))) for channels in (3, 1)]
     material = transfer.Material(*albedos, jnp.asarray(8.0))
-    tiles = make_tiles(ball, EYE, distant=True, count=5, block=16)
+    tiles = make_tiles(ball, EYE, distant=True, count=5, block=16, quantized=False)
     result = shade_tiles(light, ball, EYE, material, tiles, distant=True, normalized=False)
     full = transfer.shade_glossy(light, ball, EYE, material, distant=True, normalized=False)
     np.testing.assert_allclose(result.color, full, atol=1e-14)
@@ -114,8 +114,8 @@ def test_error_falls_with_the_directions(ball, light):
         color = shade_tiles(light, ball, EYE, material, tiles).color
         errors.append(np.sqrt(np.mean((color - full) ** 2)) / np.std(full))
     assert errors[0] < 0.12
-    assert errors[1] < 0.08
-    assert errors[2] < 0.021
+    assert errors[1] < 0.1
+    assert errors[2] < 0.03
 
 
 def test_a_local_rule_is_the_best_for_its_directions(rng):
@@ -123,31 +123,64 @@ def test_a_local_rule_is_the_best_for_its_directions(rng):
     degree, exponent, count = 4, 16.0, 20
     rule = _local_rule.local_rule(degree, count, exponent)
     nodes = product_nodes(degree)
-    falloff = 1 / (1 + harmonics.degrees(degree))
-    lights = nodes.basis @ (rng.normal(size=(4000, len(falloff))) * falloff).T
+    lights = rng.normal(size=(4000, 25)) / np.sqrt(1 + harmonics.degrees(degree))
     poles = _local_rule._poles(4000)
-    np.testing.assert_allclose(np.arccos(poles[:, 2]).max(), 0.3, atol=1e-4)
-    lobes = harmonics.convolve(
-        harmonics.evaluate(rng.permutation(poles), degree), harmonics.phong(exponent, degree)
+    np.testing.assert_allclose(np.arccos(poles[:, 2]).max(), 0.2, atol=1e-4)
+    lobes = np.asarray(
+        harmonics.convolve(
+            harmonics.evaluate(rng.permutation(poles), degree), harmonics.phong(exponent, degree)
+        )
     )
-    f = lights * (nodes.basis @ np.asarray(lobes).T)
-    at = [int(np.argmin(np.sum((nodes.directions - w) ** 2, axis=1))) for w in rule.directions]
-    coefficients = nodes.project @ f
+
+    def products(basis):
+        return (basis @ lights.T) * (basis @ lobes.T)
+
+    coefficients = nodes.project @ products(nodes.basis)
+    values = products(np.asarray(harmonics.evaluate(rule.directions, degree)))
     seen, unseen = slice(0, 2000), slice(2000, 4000)
-    fitted = np.linalg.lstsq(f[at, seen].T, coefficients[:, seen].T, rcond=None)[0]
+    fitted = np.linalg.lstsq(values[:, seen].T, coefficients[:, seen].T, rcond=None)[0]
 
     def error(rows):
-        return np.sqrt(np.mean((rows.T @ f[at, unseen] - coefficients[:, unseen]) ** 2))
+        return np.sqrt(np.mean((rows.T @ values[:, unseen] - coefficients[:, unseen]) ** 2))
 
     size = np.sqrt(np.mean(coefficients[:, unseen] ** 2))
     assert error(rule.rows) < 1.02 * error(fitted)
-    assert error(rule.rows) < 0.13 * size
+    assert error(rule.rows) < 0.16 * size
+
+
+def test_the_lobe_of_a_rule_is_the_lobe_down_to_its_lowest_cosine():
+    degree, exponent = 10, 32.0
+    rule = _local_rule.local_rule(degree, 40, exponent)
+    assert len(rule.powers) == 7
+    zonal = np.asarray(harmonics.phong(exponent, degree))
+    lobe = zonal * np.sqrt((2 * np.arange(degree + 1) + 1) / (4 * np.pi))
+    t = np.linspace(rule.lowest, 1, 50)
+    exact = np.polynomial.legendre.legval(t, lobe)
+    few = np.polynomial.polynomial.polyval(t - rule.middle, rule.powers @ zonal)
+    np.testing.assert_allclose(few, exact, atol=0.005 * exact[-1])
+    widest = -(np.arccos(rule.directions[:, 2]).max() + 0.1)
+    np.testing.assert_allclose(rule.lowest, np.cos(widest), atol=1e-12)
 
 
 def test_a_rule_of_all_directions_is_the_exact_one():
     nodes, rule = product_nodes(4), _local_rule.local_rule(4, 200, 32.0)
     np.testing.assert_array_equal(rule.directions, nodes.directions)
     np.testing.assert_array_equal(rule.rows, nodes.project.T)
+    assert rule.lowest == -1
+    t = np.linspace(-1, 1, 9)
+    bands = np.polynomial.polynomial.polyvander(t, 4) @ rule.powers
+    exact = np.polynomial.legendre.legvander(t, 4) * np.sqrt((2 * np.arange(5) + 1) / (4 * np.pi))
+    np.testing.assert_allclose(bands, exact, atol=1e-13)
+
+
+def test_quantized_samples_are_a_step_s_half_off(ball, light):
+    plain, rounded = (make_tiles(ball, EYE, count=5, block=16, quantized=q) for q in (False, True))
+    assert rounded.samples.dtype == jnp.int8
+    steps = np.asarray(rounded.steps)[..., None]
+    difference = np.asarray(rounded.samples) * steps - np.asarray(plain.samples)
+    assert np.all(np.abs(difference) <= 0.501 * steps)
+    colors = [shade_tiles(light, ball, EYE, MATERIAL, t).color for t in (plain, rounded)]
+    np.testing.assert_allclose(*colors, atol=4e-3 * np.abs(colors[0]).max())
 
 
 def test_frames_reuse_compiled_code(ball, light):
@@ -161,7 +194,7 @@ def test_frames_reuse_compiled_code(ball, light):
 
 
 def test_tiles_differentiate_as_the_full_computation(ball, light, rng):
-    tiles = make_tiles(ball, EYE, count=5, block=16)
+    tiles = make_tiles(ball, EYE, count=5, block=16, quantized=False)
     weights = jnp.asarray(rng.normal(size=(COUNT, 3)))
 
     def loss(shade):
@@ -196,13 +229,6 @@ def test_tiles_of_a_batch_of_lights(ball, light):
     both = jax.vmap(color)(lights)
     np.testing.assert_allclose(both[1], color(lights[1]), atol=1e-12)
     np.testing.assert_allclose(both[1], 2 * both[0], atol=1e-12)
-
-
-def test_written_out_sums_are_the_matrix_products(rng):
-    weights, values = (jnp.asarray(rng.uniform(-1, 1, size=s)) for s in ((3, 4, 9), (3, 9, 8)))
-    expected = np.einsum("bcn,bnv->bcv", weights, values)
-    for form in (_tiles._written_out, _tiles._as_matrices):
-        np.testing.assert_allclose(form(weights, values), expected, atol=1e-14)
 
 
 @pytest.mark.parametrize(("count", "block"), [(7, 16), (1, 8), (1000, 7)])

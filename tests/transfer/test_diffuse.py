@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from jax.test_util import check_grads
 
-from jaxsh.transfer import Material, Transfer, shade_diffuse
+from jaxsh.transfer import Material, Transfer, quantize, shade_diffuse
+from jaxsh.transfer._block_sums import _as_matrices, _written_out
 
 V, K = 6, 9
 
@@ -130,3 +131,76 @@ def test_materials_are_arrays_and_trees(rng):
 def test_bad_materials_are_refused(values, message):
     with pytest.raises(ValueError, match=message):
         Material(*(np.asarray(value) if isinstance(value, list) else value for value in values))
+
+
+@pytest.mark.parametrize(("dtype", "rtol"), [(np.float32, 3e-6), (np.float64, 1e-14)])
+@pytest.mark.parametrize("lights", [(), (1,), (5, 1)])
+def test_quantized_is_the_definition_of_what_was_rounded(rng, dtype, rtol, lights):
+    made = transfer(rng, dtype)
+    quantized = quantize(made)
+    assert (quantized.count, quantized.degree) == (V, 2)
+    steps = np.abs(made.coefficients).max(axis=0) / 127
+    np.testing.assert_allclose(quantized.steps, steps, rtol=1e-6)
+    rounded = np.round(np.asarray(made.coefficients) / np.asarray(quantized.steps))
+    np.testing.assert_array_equal(quantized.whole[0, :, :V].T, rounded)
+    light = rng.normal(size=(*lights, 3, K))
+    each = np.broadcast_to(light, (*lights[:-1], V, 3, K))
+    exact = np.einsum("...vck,vk->...vc", each, rounded * np.asarray(quantized.steps)) / np.pi
+    got = shade_diffuse(jnp.asarray(light, dtype), quantized, 1.0)
+    assert got.dtype == dtype
+    np.testing.assert_allclose(got, exact, rtol=rtol, atol=rtol * np.abs(exact).max())
+    lower = shade_diffuse(jnp.asarray(light[..., :4], dtype), quantized, 1.0)
+    padded = np.pad(light[..., :4], [(0, 0)] * (light.ndim - 1) + [(0, 5)])
+    same = shade_diffuse(jnp.asarray(padded, dtype), quantized, 1.0)
+    np.testing.assert_allclose(lower, same, atol=rtol * np.abs(exact).max())
+
+
+def test_quantized_is_differentiable_and_maps_over_lights(rng):
+    quantized, light = quantize(transfer(rng)), jnp.asarray(rng.normal(size=(2, 3, K)))
+    albedo = jnp.asarray(rng.uniform(size=(V, 1)))
+
+    def shade(light, albedo):
+        return shade_diffuse(light, quantized, albedo)
+
+    check_grads(shade, (light[0], albedo), order=1, modes=["fwd", "rev"])
+    both = jax.vmap(shade, in_axes=(0, None))(light, albedo)
+    np.testing.assert_allclose(both[1], shade(light[1], albedo), atol=1e-14)
+
+
+def test_quantized_of_more_than_a_block_and_of_zeros(rng):
+    rows = np.zeros((130, K))
+    rows[129, 3] = 2.0
+    made = Transfer(
+        jnp.asarray(rows),
+        *[jnp.asarray(rng.normal(size=(130, 3)))] * 2,
+        neighbors=jnp.zeros((130, 1), np.int32),
+    )
+    light = jnp.asarray(rng.normal(size=(3, K)))
+    got = shade_diffuse(light, quantize(made), 1.0)
+    np.testing.assert_allclose(got, rows @ light.T / np.pi, atol=1e-14)
+
+
+def test_quantized_refuses_what_does_not_fit(rng, unchecked):
+    made = transfer(rng)
+    with pytest.raises(ValueError, match="finite"):
+        quantize(
+            Transfer(
+                made.coefficients.at[0, 0].set(jnp.nan),
+                made.positions,
+                made.normals,
+                made.neighbors,
+            )
+        )
+    with pytest.raises(ValueError, match="lights that all vertices share"):
+        shade_diffuse(rng.normal(size=(V, 3, K)), quantize(made), 0.5)
+    with pytest.raises(ValueError, match="above the transfer's, 2"):
+        shade_diffuse(rng.normal(size=(3, 16)), quantize(made), 0.5)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.int8])
+def test_written_out_sums_are_the_matrix_products(rng, dtype):
+    weights = jnp.asarray(rng.uniform(-1, 1, size=(3, 4, 9)))
+    values = jnp.asarray(rng.integers(-100, 100, size=(3, 9, 8)), dtype)
+    expected = np.einsum("bcn,bnv->bcv", weights, np.asarray(values))
+    for form in (_written_out, _as_matrices):
+        np.testing.assert_allclose(form(weights, values), expected, atol=1e-12)
