@@ -8,6 +8,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 # Vertices per pass: what they need stays in cache.
 BLOCK = 1024
+_ROW = 256
 
 
 Work = Callable[[Int[Array, " block"]], Float[Array, "rows block"]]
@@ -30,7 +31,7 @@ def compacted(work: Work, active: Bool[Array, " v"]) -> Float[Array, "rows v"]:
     """
     count = active.shape[0]
     blocks = -(-count // BLOCK)
-    place = jnp.cumsum(active, dtype=jnp.int32) - 1
+    place = _running_count(active) - 1
     # Past the end where not active, and so dropped.
     target = jnp.where(active, place, blocks * BLOCK)
     numbers = jnp.zeros(blocks * BLOCK, jnp.int32)
@@ -49,3 +50,12 @@ def compacted(work: Work, active: Bool[Array, " v"]) -> Float[Array, "rows v"]:
     flat = jnp.moveaxis(done, 0, 1).reshape(done.shape[1], -1)
     values = flat.at[:, jnp.maximum(place, 0)].get(mode="promise_in_bounds")
     return jnp.where(active[None], values, 0.0)
+
+
+def _running_count(active: Bool[Array, " v"]) -> Int[Array, " v"]:
+    """Their cumulative sum, row by row of a square, which takes fewer steps than all in one."""
+    count = active.shape[0]
+    rows = jnp.pad(active, (0, -count % _ROW)).reshape(-1, _ROW)
+    along = jnp.cumsum(rows, axis=1, dtype=jnp.int32)
+    before = jnp.cumsum(along[:, -1]) - along[:, -1]
+    return (along + before[:, None]).reshape(-1)[:count]

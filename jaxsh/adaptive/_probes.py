@@ -9,20 +9,21 @@ from jaxtyping import ArrayLike, Float
 from ..harmonics import degree_of
 from ..harmonics._checks import align
 from ..harmonics._fence import fenced
-from ..transfer import Material, Transfer, shade_diffuse
-from ..transfer._lobe import lobe_polynomial, reflected
+from ..transfer import Material, QuantizedTransfer, Transfer, shade_diffuse
+from ..transfer._lobe import lobe_polynomial, mirrored
 from ..transfer._lobe_products import lobe_products
 from ._compact import compacted, everywhere
 from ._costs import product_cost, sum_cost
 from ._options import checked_frame, checked_scalar
 from ._probe_sets import NEAREST, ProbeSet
 from ._result import AdaptiveResult
+from ._roi import seen_as_changed
 from ._staged import row_products
 
 
 def shade_probes(
     light: Float[ArrayLike, "3 k"],
-    transfer: Transfer,
+    transfer: Transfer | QuantizedTransfer,
     eye: Float[ArrayLike, " 3"],
     material: Material,
     probes: ProbeSet,
@@ -55,7 +56,7 @@ def shade_probes(
     Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
     """
     light, transfer, eye, material = checked_frame(light, transfer, eye, material)
-    count = len(transfer.positions)
+    count = transfer.count
     if len(probes.nearest) != count or probes.degree != transfer.degree:
         raise ValueError(
             f"expected probes of {count} vertices and degree {transfer.degree}, got "
@@ -78,11 +79,11 @@ def shade_probes(
 @functools.partial(jax.jit, static_argnames=("distant", "normalized"))
 def _shade_probes(light, transfer, eye, material, probes, limits, distant, normalized):
     threshold, exposure = limits
-    axis = reflected(eye, transfer.positions, transfer.normals, distant)
+    axis = mirrored(eye, probes.base.positions, probes.base.normals, distant)
     polynomial = lobe_polynomial(material.exponent, probes.degree, normalized)
 
     def in_full(vertices):
-        return row_products(light, probes.samples, axis, polynomial, vertices)
+        return row_products(light, probes.rows, axis, polynomial, vertices)
 
     base_polynomial = lobe_polynomial(material.exponent, probes.base.degree, normalized)
     width = (probes.base.degree + 1) ** 2
@@ -92,7 +93,7 @@ def _shade_probes(light, transfer, eye, material, probes, limits, distant, norma
     spread, carried = fenced(_between, rest, probes.nearest, probes.weights, base)
     albedo = material.specular
     specular = albedo.T if albedo.ndim == 2 else albedo.reshape(-1, 1)
-    active = fenced(_uneven, spread, specular, exposure, threshold)
+    active = fenced(seen_as_changed, spread, threshold, specular * exposure)
     glossy = jnp.where(active[None], compacted(in_full, active), carried).T
 
     diffuse = shade_diffuse(light, transfer, material.diffuse)
@@ -109,10 +110,6 @@ def _shade_probes(light, transfer, eye, material, probes, limits, distant, norma
 
 def _between(rest, nearest, weights, base):
     """How much a vertex's probes differ, and what they say of it."""
-    near = [rest[:, nearest[:, i]] for i in range(NEAREST)]
+    near = [rest.at[:, nearest[:, i]].get(mode="promise_in_bounds") for i in range(NEAREST)]
     spread = functools.reduce(jnp.maximum, near) - functools.reduce(jnp.minimum, near)
     return spread, base + sum(w[None] * n for w, n in zip(weights.T, near, strict=True))
-
-
-def _uneven(spread, specular, exposure, threshold):
-    return jnp.max(spread * specular, axis=0) * exposure >= threshold

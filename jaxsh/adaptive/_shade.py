@@ -4,7 +4,7 @@ from typing import Any
 
 from jaxtyping import ArrayLike, Float
 
-from ..transfer import Material, Transfer
+from ..transfer import Material, QuantizedTransfer, Transfer
 from ._levels import shade_levels
 from ._masks import shade_masks
 from ._probe_sets import ProbeSet
@@ -28,7 +28,7 @@ SETS = {"probes": ProbeSet, "tiles": TileSet}
 
 def shade(
     light: Float[ArrayLike, "3 k"],
-    transfer: Transfer | StagedTransfer,
+    transfer: Transfer | QuantizedTransfer | StagedTransfer,
     eye: Float[ArrayLike, " 3"],
     material: Material,
     *,
@@ -43,10 +43,13 @@ def shade(
       three operands, and no more.
     - "two_stage": one decision at a middle degree, then all or nothing. Of what `stage` makes.
       Pays against products with the light's matrix, not against `shade_glossy`.
-    - "probes": glossy light at `probes`, a `ProbeSet`, interpolated where it is smooth. About as
-      fast as `shade_glossy`.
+    - "probes": glossy light at `probes`, a `ProbeSet`, interpolated where it is smooth. Somewhat
+      faster than `shade_glossy`.
     - "tiles": sums over few directions about the reflected one, those of `tiles`, a `TileSet`.
       Pays against all of them.
+
+    The last two need of `transfer` the diffuse part alone, and are faster where it is what
+    `transfer.quantize` makes.
 
     `shade_glossy` is that of a sampled transfer, on the CPU. Where only the light turns, none of
     these is as fast as `transfer.eye_product`, which is exact; where only the eye moves, a
@@ -67,4 +70,8 @@ def shade(
         )
     if isinstance(transfer, StagedTransfer) and method != "two_stage":
         transfer = transfer.transfer
+    if isinstance(transfer, QuantizedTransfer) and method not in SETS:
+        raise ValueError(
+            f"method {method!r} needs the transfer's coefficients, got what quantize made of them"
+        )
     return METHODS[method](light, transfer, eye, material, **options)

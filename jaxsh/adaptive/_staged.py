@@ -5,15 +5,23 @@ import functools
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float, Int, Int8
 
 from ..harmonics import degree_of
 from ..harmonics._fence import fenced
 from ..harmonics._indexing import check_degree
-from ..transfer import SampledTransfer, Transfer, sample
+from ..transfer import QuantizedTransfer, SampledTransfer, Transfer, quantize, sample
 from ..transfer._lobe import lobe
 from ..transfer._nodes import product_nodes
+from ..transfer._quantized import in_steps
 from ..transfer._shade import tall_product
+
+
+class SampledRows(eqx.Module):
+    """A transfer in the directions of `product_nodes`, vertex by vertex. Made by `sample_rows`."""
+
+    samples: Int8[Array, "v n"] | Float[Array, "v n"]
+    steps: Float[Array, " n"]  # what samples count
 
 
 class StagedTransfer(eqx.Module):
@@ -24,9 +32,10 @@ class StagedTransfer(eqx.Module):
     """
 
     transfer: Transfer
+    diffuse: Transfer | QuantizedTransfer
     base: SampledTransfer
     middle: SampledTransfer
-    samples: Float[Array, "v n"]
+    rows: SampledRows
     degree: int = eqx.field(static=True)
 
     @property
@@ -36,7 +45,12 @@ class StagedTransfer(eqx.Module):
 
 
 def stage(
-    transfer: Transfer, degree: int | None = None, *, middle: int | None = None, base: int = 2
+    transfer: Transfer,
+    degree: int | None = None,
+    *,
+    middle: int | None = None,
+    base: int = 2,
+    quantized: bool = True,
 ) -> StagedTransfer:
     """The transfer, ready for `shade_two_stage` with lights of `degree` (default: its own).
 
@@ -55,23 +69,28 @@ def stage(
         )
     return StagedTransfer(
         transfer,
+        quantize(transfer) if quantized else transfer,
         sample(transfer, base),
         sample(transfer, middle),
-        sample_rows(transfer.coefficients, degree),
+        sample_rows(transfer.coefficients, degree, quantized),
         degree,
     )
 
 
-@functools.partial(jax.jit, static_argnums=1)
-def sample_rows(coefficients: Float[Array, "v k"], degree: int) -> Float[Array, "v n"]:
-    """Values at the nodes of a degree, vertex by vertex."""
+@functools.partial(jax.jit, static_argnums=(1, 2))
+def sample_rows(
+    coefficients: Float[Array, "v k"], degree: int, quantized: bool = True
+) -> SampledRows:
     basis = jnp.asarray(product_nodes(degree).basis, coefficients.dtype)
-    return _matmul(coefficients[:, : basis.shape[1]], basis.T)
+    samples = _matmul(coefficients[:, : basis.shape[1]], basis.T)
+    if quantized:
+        return SampledRows(*in_steps(samples, 0))
+    return SampledRows(samples, jnp.ones_like(basis[:, 0]))
 
 
 def row_products(
     light: Float[Array, "3 k"],
-    samples: Float[Array, "v n"],
+    transfer: SampledRows,
     axis: Float[Array, "3 v"],
     lobes: Float[Array, "bands ..."],
     rows: Int[Array, " b"],
@@ -79,7 +98,7 @@ def row_products(
     """∫ L O lobe(B·ω) dω of some vertices: what `shade_glossy` does for all."""
     nodes = product_nodes(degree_of(light.shape[-1]))
     directions, project = (jnp.asarray(a, light.dtype) for a in (nodes.directions, nodes.project))
-    weights = _matmul(light, project)
+    weights = _matmul(light, project) * transfer.steps[None]
     if lobes.ndim == 2:
         lobes = lobes.at[:, rows].get(mode="promise_in_bounds")
     lobes = lobes.reshape(len(lobes), -1, 1)
@@ -89,10 +108,10 @@ def row_products(
         # Gathered here, where it is used: XLA writes a gather of its own out at half the speed.
         some = samples.at[rows].get(mode="promise_in_bounds")
         a, b, c = axis[..., None]
-        return some * lobe(x * a + y * b + z * c, lobes)
+        return some.astype(axis.dtype) * lobe(x * a + y * b + z * c, lobes)
 
     axis = axis.at[:, rows].get(mode="promise_in_bounds")
-    return tall_product(fenced(lobed, axis, samples, lobes, rows), weights).T
+    return tall_product(fenced(lobed, axis, transfer.samples, lobes, rows), weights).T
 
 
 def _matmul(a, b):

@@ -98,20 +98,46 @@ class TileFollower:
 
     The set of the nearest view is arranged in the background while frames go on with the one
     before, whose accuracy falls off slowly with the angle between the views. Frames meanwhile
-    share the machine with that and are slower, and starting it takes a moment of its own.
+    share the machine with that and are slower, and starting it takes a moment of its own. The
+    `keep` sets last used are kept, for an eye that comes back; where the eye will go is known,
+    `prepare` spares the frames all of it.
     """
 
-    def __init__(self, atlas: TileAtlas, transfer: Transfer, eye: Float[ArrayLike, " 3"]):
-        self._atlas, self._transfer = atlas, transfer
+    def __init__(
+        self, atlas: TileAtlas, transfer: Transfer, eye: Float[ArrayLike, " 3"], *, keep: int = 4
+    ):
+        if keep < 2:
+            raise ValueError(f"expected keep of at least 2, this set and the next, got {keep}")
+        self._atlas, self._transfer, self._keep = atlas, transfer, keep
+        self._sets: dict[int, TileSet] = {}  # the one last used at the end
         self._view = atlas.view(eye)
-        self._current = self._next = atlas.arranged(transfer, self._view)
+        self._use(self._view)
 
     def __call__(self, eye: Float[ArrayLike, " 3"]) -> TileSet:
-        """The newest set that is ready."""
-        if all(leaf.is_ready() for leaf in jax.tree.leaves(self._next)):
-            self._current = self._next
-            view = self._atlas.view(eye)
-            if view != self._view:
-                self._view = view
-                self._next = self._atlas.arranged(self._transfer, view)
-        return self._current
+        """The set of the nearest view, or the one before until that is ready."""
+        view = self._atlas.view(eye)
+        if all(map(_is_ready, self._sets.values())):  # one at a time is under way
+            self._use(view)
+        if view in self._sets and _is_ready(self._sets[view]):
+            self._view = view
+        return self._sets[self._view]
+
+    def prepare(self, eyes: Float[ArrayLike, "n 3"]) -> int:
+        """Arranges the sets for these eyes now, and keeps them; their number."""
+        views = list(dict.fromkeys(self._atlas.view(eye) for eye in np.asarray(eyes)))
+        self._keep = max(self._keep, len(views) + 1)
+        for view in views:
+            jax.block_until_ready(self._use(view))
+        return len(views)
+
+    def _use(self, view: int) -> TileSet:
+        found = self._sets.pop(view, None)
+        self._sets[view] = found or self._atlas.arranged(self._transfer, view)
+        oldest = [v for v in self._sets if v not in (view, self._view)]
+        for dropped in oldest[: max(len(self._sets) - self._keep, 0)]:
+            del self._sets[dropped]
+        return self._sets[view]
+
+
+def _is_ready(tiles: TileSet) -> bool:
+    return all(leaf.is_ready() for leaf in jax.tree.leaves(tiles))

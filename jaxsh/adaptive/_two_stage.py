@@ -9,9 +9,9 @@ from jaxtyping import ArrayLike, Float
 from ..harmonics import degree_of, num_coefficients
 from ..harmonics._fence import fenced
 from ..transfer import Material, SampledTransfer, Transfer
-from ..transfer._lobe import lobe_polynomial, reflected
+from ..transfer._lobe import lobe_polynomial, mirrored
 from ..transfer._lobe_products import lobe_products
-from ..transfer._shade import tall_product
+from ..transfer._shade import irradiances
 from ._compact import compacted
 from ._costs import product_cost, sum_cost
 from ._filter import Filter, albedos, threshold
@@ -63,7 +63,7 @@ def shade_two_stage(
     )
     target = degree_of(light.shape[-1])
     if staged is None:
-        staged = stage(plain, target, middle=middle, base=settings.base)
+        staged = stage(plain, target, middle=middle, base=settings.base, quantized=False)
     middle = staged.middle.degree if middle is None else middle
     wanted = settings.base, middle, target
     if wanted != staged.degrees:
@@ -78,7 +78,7 @@ def shade_two_stage(
 def _two_stage(light, staged, eye, material, settings: Filter, previous):
     transfer, (base, middle, target) = staged.transfer, staged.degrees
     count = len(transfer.positions)
-    axis = reflected(eye, transfer.positions, transfer.normals, settings.distant)
+    axis = mirrored(eye, staged.base.positions, staged.base.normals, settings.distant)
     albedo = albedos(material, count)
 
     def lobes(degree):
@@ -89,7 +89,7 @@ def _two_stage(light, staged, eye, material, settings: Filter, previous):
         return lobe_products(lights, sampled, axis, lobes(sampled.degree))
 
     def second(rows):
-        return row_products(light, staged.samples, axis, lobes(target), rows)
+        return row_products(light, staged.rows, axis, lobes(target), rows)
 
     basic, first = everyone(staged.base), everyone(staged.middle)
     region = fenced(
@@ -106,7 +106,7 @@ def _two_stage(light, staged, eye, material, settings: Filter, previous):
     glossy = jnp.where(region[None], compacted(second, region), outside)
     if settings.smoothing:
         glossy = basic + smooth(glossy - basic, region, transfer.neighbors)
-    irradiance = tall_product(transfer.coefficients[:, : light.shape[-1]], light).T
+    irradiance = irradiances(light, staged.diffuse).T
     color = albedo["specular"] * glossy + albedo["diffuse"] * irradiance
 
     reached = jnp.where(region, jnp.asarray(target, jnp.int32), jnp.asarray(shown, jnp.int32))

@@ -28,6 +28,11 @@ class QuantizedTransfer(eqx.Module):
     count: int = eqx.field(static=True)  # V
 
     @property
+    def dtype(self) -> jnp.dtype:
+        """Of what is shaded with it."""
+        return self.steps.dtype
+
+    @property
     def degree(self) -> int:
         return degree_of(len(self.steps))
 

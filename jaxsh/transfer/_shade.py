@@ -37,8 +37,7 @@ def shade_diffuse(
     Raises `ValueError` for shapes that do not fit.
     """
     quantized = isinstance(transfer, QuantizedTransfer)
-    count = transfer.count if quantized else len(transfer.coefficients)
-    dtype = (transfer.steps if quantized else transfer.coefficients).dtype
+    count, dtype = transfer.count, transfer.dtype
     light, albedo = checked_light(light, count, transfer.degree, dtype), as_float(albedo)
     if quantized and light.ndim > 2 and light.shape[-3] != 1:
         raise ValueError(

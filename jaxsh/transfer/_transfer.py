@@ -1,6 +1,7 @@
 """The baked thing."""
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from ..harmonics import degree_of
@@ -25,6 +26,10 @@ class Transfer(eqx.Module):
     def count(self) -> int:
         """V."""
         return self.coefficients.shape[0]
+
+    @property
+    def dtype(self) -> jnp.dtype:
+        return self.coefficients.dtype
 
     @property
     def degree(self) -> int:

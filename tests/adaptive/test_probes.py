@@ -23,7 +23,7 @@ def scene(rng):
     ring = (np.arange(COUNT)[:, None] + np.array([-1, 1])) % COUNT
     ball = transfer.Transfer(coefficients, normals, normals, jnp.asarray(ring, jnp.int32))
     light = jnp.asarray(rng.normal(size=(3, WIDTH)) / (1 + harmonics.degrees(DEGREE)) ** 2)
-    return light, ball, make_probes(ball, share=0.2, base=1)
+    return light, ball, make_probes(ball, share=0.2, base=1, quantized=False)
 
 
 def test_threshold_0_gives_the_full_result(scene):

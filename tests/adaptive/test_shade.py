@@ -5,25 +5,30 @@ import pytest
 from test_masks import scene
 
 from jaxsh import adaptive
-from jaxsh.transfer import Material, shade_glossy
+from jaxsh.transfer import Material, quantize, shade_glossy
 
 
-def test_every_method_at_its_finest_is_the_full_computation(rng):
+@pytest.mark.parametrize(("quantized", "tolerance"), [(False, 1e-11), (True, 6e-3)])
+def test_every_method_at_its_finest_is_the_full_computation(rng, quantized, tolerance):
     light, made, eye, material = scene(rng)
     material = Material(material.diffuse, material.specular, 9.0)
     everyone = {"threshold": 0.0, "diffuse_threshold": 0.0}
+    probes = adaptive.make_probes(made, share=0.2, quantized=quantized)
+    tiles = adaptive.make_tiles(made, eye, directions=500, quantized=quantized)
     options = {
-        "masks": everyone,
-        "levels": everyone,
         "two_stage": everyone,
-        "probes": {"probes": adaptive.make_probes(made, share=0.2), "threshold": 0.0},
-        "tiles": {"tiles": adaptive.make_tiles(made, eye, directions=500)},
+        "probes": {"probes": probes, "threshold": 0.0},
+        "tiles": {"tiles": tiles},
     }
+    transfers = {"two_stage": adaptive.stage(made, quantized=quantized)}
+    if not quantized:
+        options |= {"masks": everyone, "levels": everyone}
     full = shade_glossy(light, made, eye, material)
-    staged = adaptive.stage(made)
     for method, own in options.items():
-        result = adaptive.shade(light, staged, eye, material, method=method, **own)
-        np.testing.assert_allclose(result.color, full, rtol=0, atol=1e-11, err_msg=method)
+        given = transfers.get(method, quantize(made) if quantized else made)
+        result = adaptive.shade(light, given, eye, material, method=method, **own)
+        worst = tolerance * np.abs(full).max()
+        np.testing.assert_allclose(result.color, full, rtol=0, atol=worst, err_msg=method)
         assert result.spent.shape == ()
         assert result.spent > 0
 
@@ -44,3 +49,9 @@ def test_unknown_methods_and_missing_sets_are_refused(unchecked, rng, options, m
 def test_options_of_another_method_are_refused(unchecked, rng):
     with pytest.raises(TypeError, match="middle"):
         adaptive.shade(*scene(rng), method="masks", middle=3)
+
+
+def test_methods_of_levels_refuse_eight_bits(unchecked, rng):
+    light, made, eye, material = scene(rng)
+    with pytest.raises(ValueError, match="method 'levels' needs the transfer's coefficients"):
+        adaptive.shade(light, quantize(made), eye, material, method="levels")

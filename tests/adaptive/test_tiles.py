@@ -262,11 +262,20 @@ def test_follower_arrives_at_the_nearest_view(ball):
     for eye in atlas.eyes:
         jax.block_until_ready(follow(eye))
     for _ in range(2):  # the set under way may still be one before
-        jax.block_until_ready(follow._next)
-        follow(atlas.eyes[-1])
-    jax.block_until_ready(follow._next)
-    arrived = follow(atlas.eyes[-1])
+        jax.block_until_ready(follow._sets)
+        arrived = follow(atlas.eyes[-1])
     np.testing.assert_array_equal(arrived.tiling.order, atlas.order[-1])
+    assert len(follow._sets) <= 4
+
+
+def test_follower_has_at_once_what_was_prepared_or_kept(ball):
+    atlas = make_tile_atlas(ball, views=6, count=4, block=32)
+    follow = TileFollower(atlas, ball, atlas.eyes[0], keep=2)
+    assert follow.prepare(np.asarray(atlas.eyes)[[1, 1, 4, 5]]) == 3
+    sets = [follow(atlas.eyes[view]) for view in (1, 4, 5, 1)]
+    for tiles, view in zip(sets, (1, 4, 5, 1), strict=True):
+        np.testing.assert_array_equal(tiles.tiling.order, atlas.order[view])
+    assert sets[3] is sets[0]
 
 
 def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
@@ -301,5 +310,7 @@ def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
         make_tiles(ball, EYE, count=0)
     with pytest.raises(ValueError, match="eye"):
         make_tiles(ball, EYE[:2])
+    with pytest.raises(ValueError, match="keep of at least 2"):
+        TileFollower(make_tile_atlas(ball, views=1, count=2), ball, EYE, keep=1)
     with pytest.raises(ValueError, match="at least 1 view"):
         make_tile_atlas(ball, views=0)

@@ -16,7 +16,7 @@ LIMITS, ALL, NONE = ({"threshold": threshold} for threshold in (0.15, 0.0, np.in
 
 def staged(rng, dtype="float64"):
     light, made, eye, material = scene(rng, dtype)
-    return light, stage(made, middle=MIDDLE), eye, material
+    return light, stage(made, middle=MIDDLE, quantized=False), eye, material
 
 
 @pytest.mark.parametrize(
