@@ -17,7 +17,7 @@ from ._leekim2014_scenes import Scene, towards, vertex_psnr
 
 
 def moving(context: Context, scene: Scene, frames: int, views: int, step: float) -> dict[str, Any]:
-    """A row: the frames of both, in turns, and how far tiles are from full."""
+    """A row: the frames of both, one after the other, and how far tiles are from full."""
     path = eyes(scene, frames + 1, step)
     low, high = jnp.min(scene.baked.positions, axis=0), jnp.max(scene.baked.positions, axis=0)
     distance = float(jnp.linalg.norm(path[0] - (low + high) / 2))
@@ -25,40 +25,56 @@ def moving(context: Context, scene: Scene, frames: int, views: int, step: float)
     exponent = float(scene.material.exponent)
     atlas = adaptive.make_tile_atlas(scene.baked, distance=distance, views=views, exponent=exponent)
     made = time.perf_counter() - start
-    follow = adaptive.TileFollower(atlas, scene.baked, path[0])
-    sampled = transfer.sample(scene.baked)
+    start = time.perf_counter()
+    prepared = adaptive.TileFollower(atlas, scene.baked, path[0])
+    sets = prepared.prepare(jnp.stack(path))
+    prepared_in = time.perf_counter() - start
+    sampled, quantized = transfer.sample(scene.baked), transfer.quantize(scene.baked)
 
     def full(light, eye):
         return transfer.shade_glossy(light, sampled, eye, scene.material)
 
-    def tiles(light, eye):
-        set_ = follow(eye)
-        return adaptive.shade(
-            light, scene.baked, eye, scene.material, method="tiles", tiles=set_
-        ).color
+    def tiles(follow):
+        def way(light, eye):
+            return adaptive.shade(
+                light, quantized, eye, scene.material, method="tiles", tiles=follow(eye)
+            ).color
 
-    taken: dict[str, list[float]] = {"full": [], "tiles": []}
-    errors = []
+        return way
+
+    ways = {
+        "full": full,
+        "prepared": tiles(prepared),
+        "following": tiles(adaptive.TileFollower(atlas, scene.baked, path[0])),
+    }
+    taken: dict[str, list[float]] = {name: [] for name in ways}
+    colors: dict[str, list[Array]] = {name: [] for name in ways}
     turning = [scene.light, *lights(scene, frames)]
-    for frame, (light, eye) in enumerate(zip(turning, path, strict=True)):
-        colors = {}
-        for name, way in (("full", full), ("tiles", tiles)):
+    for name, way in ways.items():
+        for frame, (light, eye) in enumerate(zip(turning, path, strict=True)):
             start = time.perf_counter()
-            colors[name] = jax.block_until_ready(way(light, eye))
+            colors[name].append(jax.block_until_ready(way(light, eye)))
             if frame:  # the first one compiles
                 taken[name].append(time.perf_counter() - start)
-        facing = towards(eye, scene.baked)
-        errors.append(float(vertex_psnr(colors["tiles"], colors["full"], facing)))
+    errors = [
+        float(vertex_psnr(ours, theirs, towards(eye, scene.baked)))
+        for ours, theirs, eye in zip(colors["prepared"], colors["full"], path, strict=True)
+    ]
     mid = {name: statistics.median(times) for name, times in taken.items()}
     mean = {name: statistics.mean(times) for name, times in taken.items()}
-    return scene.row._asdict() | {
-        "moving_full_ms": 1e3 * mid["full"],
-        "moving_tiles_ms": 1e3 * mid["tiles"],
-        "moving_gain": mid["full"] / mid["tiles"],
-        "moving_gain_mean": mean["full"] / mean["tiles"],
+    row = scene.row._asdict() | {f"moving_{name}_ms": 1e3 * mid[name] for name in ways}
+    size = sum(leaf.nbytes for leaf in jax.tree.leaves(prepared(path[0])))
+    return row | {
+        "moving_gain": mid["full"] / mid["prepared"],
+        "moving_gain_mean": mean["full"] / mean["prepared"],
+        "moving_following_gain": mid["full"] / mid["following"],
+        "moving_following_gain_mean": mean["full"] / mean["following"],
         "moving_psnr": statistics.mean(errors),
         "moving_psnr_worst": min(errors),
         "atlas_seconds": made,
+        "sets": sets,
+        "sets_seconds": prepared_in,
+        "sets_megabytes": sets * size / 1e6,
     }
 
 

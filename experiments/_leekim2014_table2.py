@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from . import Column, Context, Table, experiment
+from ._leekim2014_columns import IN_FULL, per_method
 from ._leekim2014_methods import (
     HOW,
     WHAT,
@@ -107,18 +108,8 @@ def _tables(config: Table2, rows: list[dict[str, Any]], row: Row) -> Iterator[Ta
         "Frames per second by degree",
         [
             *about,
-            Column("fps einsum", "einsum", digits=1),
-            Column("fps product form", "product form", digits=1),
-            Column("fps full", "full", "full_paper", digits=1),
-            *(
-                Column(
-                    f"fps {method}",
-                    method,
-                    "adaptive_paper" if method == "levels" else None,
-                    digits=1,
-                )
-                for method in config.methods
-            ),
+            *IN_FULL,
+            *per_method("fps", config.methods, "adaptive_paper"),
         ],
         frames,
         f"{row.mesh} under {row.environment}, baked at degree {row.degree} and cut. {WHAT}{HOW}"
@@ -129,15 +120,7 @@ def _tables(config: Table2, rows: list[dict[str, Any]], row: Row) -> Iterator[Ta
         "Image PSNR by degree, dB",
         [
             *about,
-            *(
-                Column(
-                    f"psnr {method}",
-                    method,
-                    "psnr_paper" if method == "levels" else None,
-                    digits=1,
-                )
-                for method in config.methods
-            ),
+            *per_method("psnr", config.methods, "psnr_paper"),
         ],
         frames,
         "As in table 1, the background included. At degree 2 the base is degree 1, since with the "

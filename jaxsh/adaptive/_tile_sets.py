@@ -14,7 +14,7 @@ from ..transfer import Transfer
 from ..transfer._checks import checked_eye
 from ..transfer._lobe import reflected, rows_of, unit
 from ..transfer._quantized import in_steps
-from ._local_rule import LocalRule, check_rule, local_rule
+from ._local_rule import check_rule, local_rule
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 128
@@ -151,15 +151,16 @@ def arrange(
         raise ValueError(f"expected a tiling of {vertices} vertices, got one of {held}")
     dtype = transfer.positions.dtype
     rule = local_rule(transfer.degree, directions, float(exponent))
-    rule = LocalRule(*(jnp.asarray(part, dtype) for part in rule))
+    rule = tuple(jnp.asarray(part, dtype) for part in rule)
     return _arrange(transfer, tiling, jnp.asarray(place), rule, quantized)
 
 
 @functools.partial(jax.jit, static_argnames="quantized")
 def _arrange(transfer, tiling, place, rule, quantized):
+    directions, rows, powers, lowest = rule
     turns = _turns(tiling.axes)
-    directions = jnp.matmul(rule.directions[None], jnp.swapaxes(turns, 1, 2), precision="highest")
-    rows = rotate(rule.rows, turns[:, None])
+    directions = jnp.matmul(directions[None], jnp.swapaxes(turns, 1, 2), precision="highest")
+    rows = rotate(rows, turns[:, None])
 
     def sampled(part):
         vertices, tile = part
@@ -170,9 +171,10 @@ def _arrange(transfer, tiling, place, rule, quantized):
     samples, steps = jax.lax.map(sampled, (tiling.order, tiling.tile))
     basis = evaluate(directions, transfer.degree, axis=0)
     order = tiling.order.reshape(-1)
-    receivers = rows_of(transfer.positions[order], transfer.normals[order])
-    near = rule.powers, rule.lowest
-    return TileSet(tiling, place, samples, steps, directions, basis, *near, *receivers)
+    positions, normals = rows_of(transfer.positions[order], transfer.normals[order])
+    return TileSet(
+        tiling, place, samples, steps, directions, basis, powers, lowest, positions, normals
+    )
 
 
 def _turns(axes: Float[Array, "tiles 3"]) -> Float[Array, "tiles 3 3"]:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Num
 
 # Sums side by side: a term waits for the one before it in its own sum alone.
-_CHAINS = 4
+_CHAINS = 8
 
 
 @jax.custom_jvp

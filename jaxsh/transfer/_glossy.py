@@ -89,7 +89,7 @@ def shade_glossy(
 def _shade_glossy(light, transfer, eye, material, distant, normalized):
     mirror = reflected if isinstance(transfer, Transfer) else mirrored
     axis = mirror(eye, transfer.positions, transfer.normals, distant)
-    if light is None:
+    if isinstance(transfer, LightProduct):
         glossy, irradiance = seen(transfer, axis, material.exponent, normalized)
     else:
         lobes = lobe_polynomial(material.exponent, degree_of(light.shape[-1]), normalized)

@@ -49,7 +49,8 @@ def _light_product(light, transfer):
 
     radiance, irradiance = jax.lax.map(tile, rows_in_tiles(transfer.coefficients[:, :width]))
     irradiance = out_of_tiles(irradiance, len(transfer.positions)).T
-    return LightProduct(radiance, irradiance, *rows_of(transfer.positions, transfer.normals))
+    positions, normals = rows_of(transfer.positions, transfer.normals)
+    return LightProduct(radiance, irradiance, positions, normals)
 
 
 def seen(

@@ -25,10 +25,10 @@ def reflected(
     Always a unit vector: a normal that is undefined counts as zero, which turns B into -ω_o, and
     an eye on the vertex itself is taken to be straight above it.
     """
-    return mirrored(eye, *rows_of(positions, normals), distant)
+    rows, units = rows_of(positions, normals)
+    return mirrored(eye, rows, units, distant)
 
 
-@jax.jit
 def rows_of(
     positions: Float[Array, "v 3"], normals: Float[Array, "v 3"]
 ) -> tuple[Float[Array, "3 v"], Float[Array, "3 v"]]:

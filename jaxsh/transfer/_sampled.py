@@ -40,15 +40,14 @@ def sample(transfer: Transfer, degree: int | None = None) -> SampledTransfer:
         raise ValueError(
             f"expected a degree of at most the transfer's, {transfer.degree}, got {degree}"
         )
-    coefficients = transfer.coefficients[:, : (degree + 1) ** 2]
-    samples = _sample(coefficients, degree)
-    return SampledTransfer(
-        samples, coefficients, *rows_of(transfer.positions, transfer.normals), degree
-    )
+    return _sample(transfer, degree)
 
 
 @functools.partial(jax.jit, static_argnums=1)
-def _sample(coefficients, degree):
+def _sample(transfer, degree):
+    coefficients = transfer.coefficients[:, : (degree + 1) ** 2]
     basis = jnp.asarray(node_passes(degree).basis, coefficients.dtype)
     values = jnp.matmul(basis.reshape(-1, basis.shape[2]), coefficients.T, precision="highest")
-    return values.reshape(*basis.shape[:2], -1)
+    samples = values.reshape(*basis.shape[:2], -1)
+    positions, normals = rows_of(transfer.positions, transfer.normals)
+    return SampledTransfer(samples, coefficients, positions, normals, degree)
