@@ -15,7 +15,7 @@ from ..transfer._nodes import product_nodes
 
 # How far from the pole lobes may point, in radians: half a tile's width, and how far an eye goes
 # before it takes other tiles.
-_REACH = 0.2
+_REACH = 0.3
 # What is expected of band l of light and transfer, as amplitudes: 1/(1 + l) to these powers.
 _LIGHT, _TRANSFER = 0.5, 2
 # Of the largest variance, added to each, so that nearly equal directions do not cancel.
@@ -29,7 +29,7 @@ _NEGLIGIBLE = 0.005
 
 
 class LocalRule(NamedTuple):
-    """∫ L O lobe(B·ω) dω ≈ Σ_n L(ω_n) lobe(B·ω_n) (A O)_n, for B within 0.2 of the pole +z.
+    """∫ L O lobe(B·ω) dω ≈ Σ_n L(ω_n) lobe(B·ω_n) (A O)_n, for B within 0.3 of the pole +z.
 
     And the lobe with as few terms as it needs there: Σ_j p_j (t - t̄)^j of t = B·ω_n, no further
     down than `lowest`, where p are `powers` times its zonal coefficients and t̄ is `middle`.
@@ -50,13 +50,13 @@ def local_rule(degree: int, count: int, exponent: float) -> LocalRule:
     """A rule of `count` directions for functions of a degree and lobes of an exponent.
 
     Light and lobes are random: of L, the bands are independent, with variances v_l that fall off
-    as natural light's do, and B is anywhere within reach. Then f = L lobe has the covariance
+    slowly, and B is anywhere within reach. Then f = L lobe has the covariance
     C(ω, ω') = Σ_l v_l (2l+1)/4π P_l(ω·ω') · mean of lobe(B·ω) lobe(B·ω') over B. With values of f
     at ω_n, the best linear estimate of its coefficients f_k has the weights A = C_nn⁻¹ C_nk, and
     an error that is known in advance (Bayesian quadrature); 1e-7 of the largest variance is added
-    to the diagonal of C_nn. The ω_n are taken one by one from
-    the exact directions of `product_nodes`, each where it lowers the error most, band l of
-    which counts as transfers have it.
+    to the diagonal of C_nn. The ω_n are taken one by one, each where it lowers the error most, band
+    l of which counts as transfers have it; then each is taken out in turn, and the best put in its
+    place.
 
     Where the exact directions are no more than `count`, it is these, and the rule is exact.
     """

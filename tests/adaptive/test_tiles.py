@@ -125,7 +125,7 @@ def test_a_local_rule_is_the_best_for_its_directions(rng):
     nodes = product_nodes(degree)
     lights = rng.normal(size=(4000, 25)) / np.sqrt(1 + harmonics.degrees(degree))
     poles = _local_rule._poles(4000)
-    np.testing.assert_allclose(np.arccos(poles[:, 2]).max(), 0.2, atol=1e-4)
+    np.testing.assert_allclose(np.arccos(poles[:, 2]).max(), 0.3, atol=1e-4)
     lobes = np.asarray(
         harmonics.convolve(
             harmonics.evaluate(rng.permutation(poles), degree), harmonics.phong(exponent, degree)
@@ -145,7 +145,7 @@ def test_a_local_rule_is_the_best_for_its_directions(rng):
 
     size = np.sqrt(np.mean(coefficients[:, unseen] ** 2))
     assert error(rule.rows) < 1.02 * error(fitted)
-    assert error(rule.rows) < 0.16 * size
+    assert error(rule.rows) < 0.22 * size
 
 
 def test_the_lobe_of_a_rule_is_the_lobe_down_to_its_lowest_cosine():
@@ -158,7 +158,7 @@ def test_the_lobe_of_a_rule_is_the_lobe_down_to_its_lowest_cosine():
     exact = np.polynomial.legendre.legval(t, lobe)
     few = np.polynomial.polynomial.polyval(t - rule.middle, rule.powers @ zonal)
     np.testing.assert_allclose(few, exact, atol=0.005 * exact[-1])
-    widest = -(np.arccos(rule.directions[:, 2]).max() + 0.1)
+    widest = -(np.arccos(rule.directions[:, 2]).max() + 0.15)
     np.testing.assert_allclose(rule.lowest, np.cos(widest), atol=1e-12)
 
 
