@@ -14,6 +14,7 @@ from ._light_product import LightProduct, seen
 from ._lobe import lobe_polynomial, mirrored, reflected
 from ._lobe_products import lobe_products
 from ._material import Material
+from ._quantized import QuantizedTransfer
 from ._sampled import SampledTransfer
 from ._shade import tall_product
 from ._transfer import Transfer
@@ -66,6 +67,8 @@ def shade_glossy(
     Raises `ValueError` for shapes that do not fit, and for a sampled transfer of another degree
     than the light's.
     """
+    if isinstance(transfer, QuantizedTransfer):
+        raise ValueError("glossy shading needs a transfer, or samples of it, not its eight bits")
     held = transfer.irradiance if isinstance(transfer, LightProduct) else transfer.coefficients
     count, dtype = held.shape[0], held.dtype
     eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)

@@ -48,9 +48,9 @@ def mirrored(
         eye = unit(eye[:, None])[:, 0]
 
     def towards(eye, positions, normals):
-        if distant:
-            return jnp.broadcast_to(eye[:, None], normals.shape)
-        there = eye[:, None] - positions
+        there = (
+            jnp.broadcast_to(eye[:, None], normals.shape) if distant else eye[:, None] - positions
+        )
         x, y, z = there == 0
         return jnp.where((x & y & z)[None], normals, there)
 

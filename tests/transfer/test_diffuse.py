@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from jax.test_util import check_grads
 
-from jaxsh.transfer import Material, Transfer, quantize, shade_diffuse
+from jaxsh.transfer import Material, Transfer, quantize, shade_diffuse, shade_glossy
 from jaxsh.transfer._block_sums import _as_matrices, _written_out
 
 V, K = 6, 9
@@ -195,6 +195,8 @@ def test_quantized_refuses_what_does_not_fit(rng, unchecked):
         shade_diffuse(rng.normal(size=(V, 3, K)), quantize(made), 0.5)
     with pytest.raises(ValueError, match="above the transfer's, 2"):
         shade_diffuse(rng.normal(size=(3, 16)), quantize(made), 0.5)
+    with pytest.raises(ValueError, match="not its eight bits"):
+        shade_glossy(rng.normal(size=(3, K)), quantize(made), np.ones(3), Material(1.0, 1.0, 2.0))
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.int8])
