@@ -14,14 +14,15 @@ def product_cost(kind: str, start: int, end: int, target: int) -> float:
     return 3 * (num_coefficients(end) ** power - before) / full_cost(target)
 
 
-def sum_cost(degree: int, target: int, nodes: int | None = None) -> float:
+def sum_cost(degree: int, target: int, nodes: int | None = None, terms: int | None = None) -> float:
     """Of a sum over nodes of light, transfer and lobe at a degree, as `shade_glossy` does it.
 
-    At each of `nodes`, or of as many as are exact, 3 for the cosine, one per band of the lobe, one
-    for the product and 3 for RGB. The diffuse part is counted apart.
+    At each of `nodes`, or of as many as are exact, 3 for the cosine, one for each of the lobe's
+    `terms`, or bands, one for the product and 3 for RGB. The diffuse part is counted apart.
     """
     nodes = len(product_nodes(degree).directions) if nodes is None else nodes
-    return nodes * (8 + degree) / full_cost(target)
+    terms = degree + 1 if terms is None else terms
+    return nodes * (7 + terms) / full_cost(target)
 
 
 def full_cost(degree: int) -> float:

@@ -30,7 +30,7 @@ class ProbeSet(eqx.Module):
 
 
 def make_probes(
-    transfer: Transfer, *, share: float = 0.06, base: int = 2, quantized: bool = True
+    transfer: Transfer, *, share: float = 0.1, base: int = 1, quantized: bool = True
 ) -> ProbeSet:
     """Every so many vertices a probe, and the four nearest to each vertex.
 

@@ -96,8 +96,9 @@ def _shade_tiles(light, transfer, eye, material, tiles, distant, normalized):
     albedo = material.specular
     albedo = albedo if albedo.ndim == 2 else albedo.reshape(1, -1)
     color = glossy * albedo + shade_diffuse(light, transfer, material.diffuse)
-    degree = tiles.degree
-    spent = product_cost("diffuse", 0, degree, degree) + sum_cost(degree, degree, directions)
+    degree, terms = tiles.degree, len(tiles.powers)
+    spent = product_cost("diffuse", 0, degree, degree)
+    spent += sum_cost(degree, degree, directions, terms)
     spent += count * directions * 3 * width / len(tiles.place) / full_cost(degree)  # of the light
     return AdaptiveResult(color, {}, jnp.asarray(spent, color.dtype))
 

@@ -118,6 +118,17 @@ def test_error_falls_with_the_directions(ball, light):
     assert errors[2] < 0.03
 
 
+def test_tiles_of_another_view_are_less_exact_and_no_more(ball, light):
+    """The lobe has few terms where its directions are, and must not run away elsewhere."""
+    material = transfer.Material(jnp.asarray(0.0), jnp.asarray(1.0), jnp.asarray(8.0))
+    tiles = make_tiles(ball, EYE, count=24, block=1, directions=32, exponent=8.0)
+    assert tiles.lowest > -1
+    for eye in (-EYE, EYE[::-1]):
+        full = transfer.shade_glossy(light, ball, eye, material)
+        color = shade_tiles(light, ball, eye, material, tiles).color
+        assert np.sqrt(np.mean((color - full) ** 2)) < 0.5 * np.std(full)
+
+
 def test_a_local_rule_is_the_best_for_its_directions(rng):
     """No worse than least squares, on lights and lobes that least squares has not seen."""
     degree, exponent, count = 4, 16.0, 20

@@ -171,7 +171,7 @@ class TestTable2:
         assert [row["degree"] for row in rows if "fps full" in row] == [2]
         # Middle degree 2 above base 1 is all of degree 2: nothing is lost.
         [low] = [row for row in rows if row.get("method") == "two_stage"]
-        assert low["psnr_object"] > 100
+        assert low["psnr_object"] > 60  # that of eight bits
         assert (folder / "figure11.png").stat().st_size > 20_000
         assert "(figure11.png)" in table
 
