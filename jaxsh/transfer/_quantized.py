@@ -59,5 +59,6 @@ def in_steps(
 ) -> tuple[Int8[Array, "..."], Float[Array, "..."]]:
     """Whole numbers from -127 to 127, and the steps that they count, shared along an axis."""
     largest = jnp.max(jnp.abs(values), axis=axis)
-    steps = jnp.where(largest > 0, largest / _LARGEST, 1.0)
+    # Of zeros, steps of one; what is not finite makes its step so, and all that it counts.
+    steps = jnp.where(largest == 0, 1.0, largest / _LARGEST)
     return jnp.round(values / jnp.expand_dims(steps, axis)).astype(jnp.int8), steps

@@ -8,6 +8,7 @@ from jax.test_util import check_grads
 
 from jaxsh.transfer import Material, Transfer, quantize, shade_diffuse, shade_glossy
 from jaxsh.transfer._block_sums import _as_matrices, _written_out
+from jaxsh.transfer._quantized import in_steps
 
 V, K = 6, 9
 
@@ -178,6 +179,13 @@ def test_quantized_of_more_than_a_block_and_of_zeros(rng):
     light = jnp.asarray(rng.normal(size=(3, K)))
     got = shade_diffuse(light, quantize(made), 1.0)
     np.testing.assert_allclose(got, rows @ light.T / np.pi, atol=1e-14)
+
+
+def test_what_is_not_finite_is_not_rounded_away():
+    values = jnp.asarray([[1.0, 0.0, 2.0], [jnp.nan, 0.0, -4.0]])
+    whole, steps = in_steps(values, 0)
+    np.testing.assert_array_equal(np.asarray(whole)[:, 2], [64, -127])  # 63.5 to even
+    np.testing.assert_allclose(steps, [np.nan, 1.0, 4 / 127], rtol=1e-15)
 
 
 def test_quantized_refuses_what_does_not_fit(rng, unchecked):
