@@ -34,7 +34,7 @@ Rows = Sequence[Mapping[str, Any]]
 
 def draw_degrees(path: Path, rows: Rows, paper: Mapping[int, tuple[float, float, float]]) -> None:
     """Figure 11: frames per second, and gains against the fastest full computation."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 5.4), layout="constrained")
     frames = [row for row in rows if "fps full" in row]
     degrees = [row["degree"] for row in frames]
     for name in (key.removeprefix("fps ") for key in frames[0] if key.startswith("fps ")):
@@ -68,7 +68,8 @@ def draw_degrees(path: Path, rows: Rows, paper: Mapping[int, tuple[float, float,
     for axis in (left, right):
         axis.set_xlabel("degree")
         axis.xaxis.set_major_locator(FixedLocator(degrees))
-        axis.legend(frameon=False, fontsize=8)
+        below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 3}
+        axis.legend(frameon=False, fontsize=8, **below)
     _finish(figure, path)
 
 
