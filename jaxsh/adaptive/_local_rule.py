@@ -1,6 +1,5 @@
 """Few directions around a glossy lobe, and what of the transfer to take in each."""
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.polynomial.chebyshev import chebpts1
 from numpy.polynomial.legendre import legval, legvander
 from numpy.polynomial.polynomial import polyval
 
+from .._core.host import read_only_cache
 from ..harmonics import degrees, phong
 from ..sphere import fibonacci
 from ..transfer._nodes import product_nodes
@@ -45,7 +45,7 @@ class LocalRule(NamedTuple):
         return (1 + self.lowest) / 2
 
 
-@functools.lru_cache(maxsize=32)
+@read_only_cache(maxsize=32)
 def local_rule(degree: int, count: int, exponent: float) -> LocalRule:
     """A rule of `count` directions for functions of a degree and lobes of an exponent.
 

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from .._core.checks import as_float, is_concrete
 from ..harmonics import degree_of
-from ..harmonics._checks import as_float, is_concrete
 from ..transfer._checks import checked_eye, checked_light, checked_material
 from ._filter import Filter
 from ._result import AdaptiveResult

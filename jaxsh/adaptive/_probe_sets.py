@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from ..harmonics._indexing import check_degree
+from .._core.checks import check_degree
 from ..transfer import SampledTransfer, Transfer, sample
 from ._staged import SampledRows, sample_rows
 

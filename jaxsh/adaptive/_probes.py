@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
+from .._core.checks import align
+from .._core.xla import materialize
 from ..harmonics import degree_of
-from ..harmonics._checks import align
-from ..harmonics._fence import fenced
 from ..transfer import Material, QuantizedTransfer, Transfer, shade_diffuse
 from ..transfer._lobe import lobe_polynomial, mirrored
 from ..transfer._lobe_products import lobe_products
@@ -90,10 +90,10 @@ def _shade_probes(light, transfer, eye, material, probes, limits, distant, norma
     base = lobe_products(light[:, :width], probes.base, axis, base_polynomial)
     at_probes = everywhere(lambda i: in_full(probes.probes[i]), len(probes.probes))
     rest = at_probes - base[:, probes.probes]
-    spread, carried = fenced(_between, rest, probes.nearest, probes.weights, base)
+    spread, carried = materialize(_between, rest, probes.nearest, probes.weights, base)
     albedo = material.specular
     specular = albedo.T if albedo.ndim == 2 else albedo.reshape(-1, 1)
-    active = fenced(seen_as_changed, spread, threshold, specular * exposure)
+    active = materialize(seen_as_changed, spread, threshold, specular * exposure)
     glossy = jnp.where(active[None], compacted(in_full, active), carried).T
 
     diffuse = shade_diffuse(light, transfer, material.diffuse)

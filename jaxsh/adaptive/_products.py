@@ -5,6 +5,7 @@ import functools
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._core.linalg import PRECISION
 from ..harmonics import convolve, evaluate, num_coefficients, phong
 
 
@@ -48,4 +49,4 @@ def increment(
     return jnp.sum(by_row + by_column, axis=1)
 
 
-_rows = functools.partial(jnp.tensordot, axes=1, precision="highest")
+_rows = functools.partial(jnp.tensordot, axes=1, precision=PRECISION)

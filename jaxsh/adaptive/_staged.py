@@ -7,14 +7,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Int8
 
+from .._core.checks import check_degree
+from .._core.linalg import matmul, tall_product
+from .._core.xla import materialize
 from ..harmonics import degree_of
-from ..harmonics._fence import fenced
-from ..harmonics._indexing import check_degree
 from ..transfer import QuantizedTransfer, SampledTransfer, Transfer, quantize, sample
 from ..transfer._lobe import lobe
 from ..transfer._nodes import product_nodes
 from ..transfer._quantized import in_steps
-from ..transfer._shade import tall_product
 
 
 class SampledRows(eqx.Module):
@@ -82,7 +82,7 @@ def sample_rows(
     coefficients: Float[Array, "v k"], degree: int, quantized: bool = True
 ) -> SampledRows:
     basis = jnp.asarray(product_nodes(degree).basis, coefficients.dtype)
-    samples = _matmul(coefficients[:, : basis.shape[1]], basis.T)
+    samples = matmul(coefficients[:, : basis.shape[1]], basis.T)
     if quantized:
         return SampledRows(*in_steps(samples, 0))
     return SampledRows(samples, jnp.ones_like(basis[:, 0]))
@@ -98,7 +98,7 @@ def row_products(
     """∫ L O lobe(B·ω) dω of some vertices: what `shade_glossy` does for all."""
     nodes = product_nodes(degree_of(light.shape[-1]))
     directions, project = (jnp.asarray(a, light.dtype) for a in (nodes.directions, nodes.project))
-    weights = _matmul(light, project) * transfer.steps[None]
+    weights = matmul(light, project) * transfer.steps[None]
     if lobes.ndim == 2:
         lobes = lobes.at[:, rows].get(mode="promise_in_bounds")
     lobes = lobes.reshape(len(lobes), -1, 1)
@@ -111,8 +111,4 @@ def row_products(
         return some.astype(axis.dtype) * lobe(x * a + y * b + z * c, lobes)
 
     axis = axis.at[:, rows].get(mode="promise_in_bounds")
-    return tall_product(fenced(lobed, axis, transfer.samples, lobes, rows), weights).T
-
-
-def _matmul(a, b):
-    return jnp.matmul(a, b, precision="highest")
+    return tall_product(materialize(lobed, axis, transfer.samples, lobes, rows), weights).T

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int, Int8
 
+from .._core.linalg import matmul
 from ..harmonics import degree_of, evaluate, rotate
 from ..transfer import Transfer
 from ..transfer._checks import checked_eye
@@ -159,13 +160,13 @@ def arrange(
 def _arrange(transfer, tiling, place, rule, quantized):
     directions, rows, powers, lowest = rule
     turns = _turns(tiling.axes)
-    directions = jnp.matmul(directions[None], jnp.swapaxes(turns, 1, 2), precision="highest")
+    directions = matmul(directions[None], jnp.swapaxes(turns, 1, 2))
     rows = rotate(rows, turns[:, None])
 
     def sampled(part):
         vertices, tile = part
         coefficients = transfer.coefficients.at[vertices].get(mode="promise_in_bounds")
-        samples = jnp.matmul(rows[tile], coefficients.T, precision="highest")
+        samples = matmul(rows[tile], coefficients.T)
         return in_steps(samples, 1) if quantized else (samples, jnp.ones_like(samples[:, 0]))
 
     samples, steps = jax.lax.map(sampled, (tiling.order, tiling.tile))

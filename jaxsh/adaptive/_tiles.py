@@ -6,8 +6,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
+from .._core.linalg import matmul
+from .._core.xla import materialize
 from ..harmonics import degree_of, phong
-from ..harmonics._fence import fenced
 from ..transfer import Material, QuantizedTransfer, Transfer, shade_diffuse
 from ..transfer._block_sums import block_sums
 from ..transfer._checks import checked_eye, checked_light, checked_material
@@ -81,14 +82,14 @@ def _shade_tiles(light, transfer, eye, material, tiles, distant, normalized):
     tile, (blocks, size) = tiles.tiling.tile, tiles.tiling.order.shape
     width, count, directions = tiles.basis.shape
     basis = tiles.basis.reshape(width, -1)
-    lights = jnp.matmul(light, basis, precision="highest").reshape(3, count, directions)
+    lights = matmul(light, basis).reshape(3, count, directions)
     weights = jnp.swapaxes(lights, 0, 1)[tile] * tiles.steps[:, None]
 
     axis = mirrored(eye, tiles.positions, tiles.normals, distant).reshape(3, blocks, 1, size)
     zonal = phong(material.exponent, tiles.degree, normalized=normalized)
-    lobe = jnp.matmul(tiles.powers, zonal, precision="highest")
-    values = fenced(_lobed, axis, tiles.directions[tile], lobe, tiles.lowest, tiles.samples)
-    glossy = fenced(block_sums, weights, values)
+    lobe = matmul(tiles.powers, zonal)
+    values = materialize(_lobed, axis, tiles.directions[tile], lobe, tiles.lowest, tiles.samples)
+    glossy = materialize(block_sums, weights, values)
     # Rows of four, since a gather of three takes one number at a time.
     glossy = jnp.pad(jnp.swapaxes(glossy, 1, 2), ((0, 0), (0, 0), (0, 1))).reshape(-1, 4)
     glossy = glossy.at[tiles.place].get(mode="promise_in_bounds")[:, :3]

@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
+from .._core.xla import materialize
 from ..harmonics import degree_of, num_coefficients
-from ..harmonics._fence import fenced
 from ..transfer import Material, SampledTransfer, Transfer
 from ..transfer._lobe import lobe_polynomial, mirrored
 from ..transfer._lobe_products import lobe_products
@@ -92,7 +92,7 @@ def _two_stage(light, staged, eye, material, settings: Filter, previous):
         return row_products(light, staged.rows, axis, lobes(target), rows)
 
     basic, first = everyone(staged.base), everyone(staged.middle)
-    region = fenced(
+    region = materialize(
         seen_as_changed,
         jax.lax.stop_gradient(first - basic),
         threshold("specular", target, settings, previous, count),

@@ -2,7 +2,6 @@
 
 import functools
 import math
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
@@ -10,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from .._core.host import cores
 from ._mesh import Mesh
 
 # One vector for each ray, or one for all of them.
@@ -126,13 +126,6 @@ class RayScene:
             run(parts[0])
         else:  # Embree runs without the interpreter's lock, so threads are enough
             list(self._pool.map(run, parts))
-
-
-def cores() -> int:
-    """The cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _paired(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -15,11 +15,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from ._checks import as_float
-from ._fence import fenced
-from ._indexing import check_degree, degrees
+from .._core.checks import as_float, check_degree
+from .._core.vectors import components_first, normalize
+from .._core.xla import materialize
+from ._indexing import degrees
 from ._tables import azimuth_table, gradient_table, zenith_table
-from ._unit import components_first, normalize
 
 
 def evaluate(
@@ -208,7 +208,7 @@ def _azimuth(
             row = row * (alpha * (x * x) + beta * (y * y) + gamma)
         return row, z, z * z - 0.5
 
-    return fenced(rows, unit)
+    return materialize(rows, unit)
 
 
 def _take(rows: Float[Array, "k n"], index: Array | np.ndarray) -> Float[Array, "... n"]:

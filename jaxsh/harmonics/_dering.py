@@ -7,8 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import as_float, flatten_batch
+from .._core.linalg import dot, einsum, matmul
 from ._basis import evaluate
-from ._checks import as_float, flatten_batch
 from ._indexing import degree_of, degrees, orders
 from ._tables import legendre
 from ._windows import damping
@@ -55,7 +56,7 @@ def _least_strength_jvp(degree, primals, tangents):
     regular = (strength > 0) & jnp.isfinite(strength) & (slope > 0)
     gradient = -damping(strength, degree) * basis / jnp.where(regular, slope, 1)
     gradient = _once(jnp.where(regular, gradient, 0), coefficients)
-    return strength, jnp.dot(gradient, tangent, precision="highest")
+    return strength, dot(gradient, tangent)
 
 
 @jax.custom_jvp
@@ -95,7 +96,7 @@ def _search(
 def _value(strength: Float[Array, ""], bands: Float[Array, " bands"]) -> Float[Array, ""]:
     """A function's value under the window, from the sums of its bands in one direction."""
     first = np.arange(len(bands), dtype=np.int32) ** 2  # the window is constant over a band
-    return jnp.dot(damping(strength, len(bands) - 1)[first], bands, precision="highest")
+    return dot(damping(strength, len(bands) - 1)[first], bands)
 
 
 def _root(bands: Float[Array, " bands"], low: Float[Array, ""]) -> Float[Array, ""]:
@@ -125,7 +126,7 @@ def _darkest(coefficients: Float[Array, " k"], degree: int) -> Float[Array, " 3"
     by_order = jax.ops.segment_sum(
         coefficients[:, None] * meridians, orders(degree) + degree, len(azimuth)
     )
-    samples = jnp.matmul(by_order.T, azimuth, precision="highest")
+    samples = matmul(by_order.T, azimuth)
     # Neighbours: around in φ, and in θ up to the first and last ring.
     ring = jnp.minimum(jnp.roll(samples, 1, axis=1), jnp.roll(samples, -1, axis=1))
     row = jnp.minimum(ring, samples)
@@ -158,7 +159,7 @@ def _refine(
         nearby = directions[:, None] + scale * jnp.einsum("pt,vtx->vpx", patch, tangents)
         nearby = nearby / jnp.linalg.norm(nearby, axis=-1, keepdims=True)
         basis = evaluate(nearby, degree, axis=0)
-        samples = jnp.einsum("k,kvp->vp", coefficients, basis, precision="highest")
+        samples = einsum("k,kvp->vp", coefficients, basis)
         best = jnp.argmin(samples, axis=-1)
         directions, values = nearby[chosen, best], samples[chosen, best]
     return directions, values

@@ -6,6 +6,8 @@ import operator
 import numpy as np
 from jaxtyping import Int
 
+from .._core.checks import check_degree
+
 
 def num_coefficients(degree: int) -> int:
     """Number of coefficients K = (degree + 1)² of a function of this degree."""
@@ -47,14 +49,3 @@ def orders(degree: int) -> Int[np.ndarray, " k"]:
     """Order m of each of the K coefficients: 0, -1, 0, 1, -2, …"""
     l = degrees(degree)
     return np.arange(len(l), dtype=np.int32) - l * (l + 1)
-
-
-def check_degree(degree: int) -> int:
-    """The degree as a Python int, or a `ValueError` that says what was expected."""
-    try:
-        value = operator.index(degree)
-    except TypeError:
-        value = -1
-    if value < 0 or isinstance(degree, bool):
-        raise ValueError(f"degree must be an integer >= 0 known at trace time, got {degree!r}")
-    return value

@@ -12,9 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ._checks import align, as_float, check_batches, flatten_batch
-from ._grid import exact_grid
-from ._indexing import check_degree, degree_of, num_coefficients
+from .._core.checks import align, as_float, check_batches, check_degree, flatten_batch
+from .._core.host import read_only_cache
+from .._core.linalg import matmul
+from ._indexing import degree_of, num_coefficients
+from ._tables import exact_grid
 
 # Functions per pass of `product`: their samples stay in cache.
 _BLOCK = 1024
@@ -73,7 +75,7 @@ def product_matrix(
     return _product_matrix(f, f_degree if degree is None else check_degree(degree))
 
 
-@functools.lru_cache(maxsize=4)
+@read_only_cache(maxsize=4)
 def _gaunt(degree: int) -> Float[np.ndarray, "k k k"]:
     grid = exact_grid(3 * degree, degree)
     weighted = (grid.basis * grid.weights).T
@@ -114,7 +116,7 @@ def _product_matrix(f, degree: int):
 
 def _matmul(a, b):
     # On GPUs and TPUs the default would round the inputs to half their digits.
-    return jnp.matmul(a, b, precision="highest")
+    return matmul(a, b)
 
 
 def _checked_pair(f: ArrayLike, g: ArrayLike):

@@ -7,10 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import align, as_float, check_batches, check_degree, is_concrete
+from .._core.linalg import einsum, matmul
 from ._basis import evaluate
-from ._checks import align, as_float, check_batches, is_concrete
-from ._grid import even_grid
-from ._indexing import check_degree, degree_of, degrees, orders
+from ._indexing import degree_of, degrees, orders
+from ._tables import even_grid
 
 
 def rotation_matrix(
@@ -45,8 +46,8 @@ def rotate(
     check_batches(coefficients=coefficients.shape, rotation=rotation.shape[:-1])
     matrix = _rotation_matrix(rotation, degree)
     if matrix.ndim == 2:
-        return jnp.matmul(coefficients, matrix.T, precision="highest")
-    return jnp.einsum("...ij,...j->...i", matrix, coefficients, precision="highest")
+        return matmul(coefficients, matrix.T)
+    return einsum("...ij,...j->...i", matrix, coefficients)
 
 
 def rotate_z(
@@ -72,11 +73,9 @@ def rotate_z(
 def _rotation_matrix(rotation: Float[Array, "*batch 3 3"], degree: int) -> Float[Array, "..."]:
     grid = even_grid(degree)
     directions = jnp.asarray(grid.directions, rotation.dtype)
-    turned = jnp.matmul(directions, rotation, precision="highest")  # rows Rᵀω
+    turned = matmul(directions, rotation)  # rows Rᵀω
     weighted = jnp.asarray(grid.basis * grid.weights, rotation.dtype)
-    matrix = jnp.einsum(
-        "in,j...n->...ij", weighted, evaluate(turned, degree, axis=0), precision="highest"
-    )
+    matrix = einsum("in,j...n->...ij", weighted, evaluate(turned, degree, axis=0))
     same_degree = np.equal.outer(degrees(degree), degrees(degree))
     return jnp.where(same_degree, matrix, jnp.zeros_like(matrix))
 

@@ -15,7 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from ._indexing import check_degree, degrees, index, orders
+from .._core.checks import check_degree
+from .._core.host import read_only_cache
+from ._indexing import degrees, index, orders
 
 
 class AzimuthTable(NamedTuple):
@@ -55,7 +57,7 @@ class GradientTable(NamedTuple):
     second: Float[np.ndarray, "3 k"]
 
 
-@functools.cache
+@read_only_cache(maxsize=None)
 def azimuth_table(degree: int) -> AzimuthTable:
     rows, factors = degree + 1, degree // 2
     lone = np.zeros((2, rows, 4))
@@ -79,7 +81,7 @@ def azimuth_table(degree: int) -> AzimuthTable:
     return AzimuthTable(lone, alpha, beta, gamma)
 
 
-@functools.cache
+@read_only_cache(maxsize=None)
 def zenith_table(degree: int) -> ZenithTable:
     l, m = degrees(degree), orders(degree)
     # Horner's rule over several roots takes half the operations of as many factors. In z² - ½ it
@@ -106,7 +108,7 @@ def zenith_table(degree: int) -> ZenithTable:
     return ZenithTable(azimuth_row, e, f, factors)
 
 
-@functools.cache
+@read_only_cache(maxsize=None)
 def gradient_table(degree: int) -> GradientTable:
     count = (degree + 1) ** 2
     row, value = np.zeros((2, 3, count), np.int32), np.zeros((2, 3, count))
@@ -177,3 +179,41 @@ def legendre(cos_theta: Float[np.ndarray, " n"], degree: int) -> Float[np.ndarra
             down = np.sqrt((l**2 - m**2) / (4 * l**2 - 1)) if l > m else 0.0
             before, now = now, up * (z * now - down * before)
     return table
+
+
+class Grid(NamedTuple):
+    """Directions with weights, and the basis there, in float64 on the host."""
+
+    directions: Float[np.ndarray, "n 3"]
+    weights: Float[np.ndarray, " n"]
+    basis: Float[np.ndarray, "k n"]
+
+
+@read_only_cache(maxsize=32)
+def exact_grid(degree: int, basis_degree: int) -> Grid:
+    """Integrates polynomials of `degree` exactly; the basis goes up to `basis_degree`."""
+    return _product_grid(degree // 2 + 1, degree + 1, degree + 1, basis_degree)
+
+
+@read_only_cache(maxsize=32)
+def even_grid(degree: int) -> Grid:
+    """Integrates even polynomials of 2·`degree` exactly, with the basis up to `degree`.
+
+    Products of two harmonics of one degree are even, so of a full grid of 2·degree + 2 azimuths
+    one of each antipodal pair will do, at twice the weight.
+    """
+    return _product_grid(degree + 1, 2 * degree + 2, degree + 1, degree)
+
+
+def _product_grid(rings: int, steps: int, used: int, basis_degree: int) -> Grid:
+    cos_theta, ring_weights = np.polynomial.legendre.leggauss(rings)
+    phi = 2 * np.pi * np.arange(used) / steps
+    sin_theta = np.sqrt(1 - cos_theta**2)
+    x, y = np.multiply.outer(sin_theta, np.cos(phi)), np.multiply.outer(sin_theta, np.sin(phi))
+    z = np.broadcast_to(cos_theta[:, None], x.shape)
+    weights = np.broadcast_to(ring_weights[:, None] * 2 * np.pi / used, x.shape)
+    m = orders(basis_degree)[:, None]
+    azimuth = np.where(m < 0, np.sin(-m * phi), np.cos(m * phi))
+    basis = legendre(cos_theta, basis_degree)[:, :, None] * azimuth[:, None]
+    directions = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+    return Grid(directions, weights.ravel(), basis.reshape(len(basis), -1))

@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ._checks import align, as_float, is_concrete
-from ._indexing import check_degree, degrees, orders
+from .._core.checks import align, as_float, check_degree, is_concrete
+from ._indexing import degrees, orders
 
 WINDOWS = ("none", "hann", "lanczos", "zonal-sinc")
 

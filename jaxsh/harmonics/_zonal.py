@@ -4,8 +4,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ._checks import align, as_float, is_concrete
-from ._indexing import check_degree, degree_of, degrees
+from .._core.checks import align, as_float, check_degree, is_concrete
+from ._indexing import degree_of, degrees
 
 
 def clamped_cosine(degree: int) -> Float[Array, " bands"]:

@@ -9,6 +9,8 @@ import jax.numpy as jnp
 from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
+from .._core.linalg import einsum
+
 _LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec. 709
 
 
@@ -74,7 +76,7 @@ def _reinhard(
 ) -> Float[Array, "*shape"]:
     image = jnp.maximum(image, 0)
     weights = jnp.asarray(_LUMINANCE, image.dtype)
-    luminance = jnp.einsum("...c,c->...", image, weights, precision="highest")[..., None]
+    luminance = einsum("...c,c->...", image, weights)[..., None]
     white = jnp.asarray(white, image.dtype)
     return image * ((1 + luminance / white / white) / (1 + luminance))
 

@@ -13,6 +13,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxsh.geometry import Mesh, RayScene
 
+from .._core.linalg import einsum
 from ._camera import Camera
 
 _rays = eqx.filter_jit(Camera.rays)
@@ -105,7 +106,7 @@ def _interpolate(raster: Raster, faces, values, background):
     # The background's -1 would be the last face, but its weights are zero.
     corners = values[faces[jnp.maximum(raster.face, 0)]]
     weights = raster.barycentric.astype(values.dtype)
-    seen = jnp.einsum("hwkc,hwk->hwc", corners, weights, precision="highest")
+    seen = einsum("hwkc,hwk->hwc", corners, weights)
     seen = jnp.where((raster.face >= 0)[..., None], seen, 0)
     pixels = _resolve(seen, raster.samples)
     free = 1 - raster.alpha[..., None].astype(values.dtype)

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import as_float, is_concrete
+from .._core.checks import as_float, is_concrete
 from ..transfer import Transfer
 from ._result import Recovered
 

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
+from .._core.linalg import matmul
 from ..midrange import Polygon
 from ..transfer import Transfer
 from ._checks import check_data, check_end
@@ -132,13 +133,13 @@ def _channel(
     lengths = jnp.where(lengths > 0, lengths, 1)
     unit = matrix / lengths[None]
     # A light that reaches nothing keeps a unit column's curvature, and the radiance zero.
-    gram = jnp.matmul(unit.T, unit, precision="highest")
+    gram = matmul(unit.T, unit)
     gram = gram + jnp.diag((jnp.diagonal(gram) == 0).astype(gram.dtype))
-    pull = jnp.matmul(unit.T, target, precision="highest")
+    pull = matmul(unit.T, target)
     bounds = jnp.zeros_like(lengths), upper * lengths
     solution = solver.run(jnp.zeros_like(lengths), params_obj=(gram, -pull), params_ineq=bounds)
     x = solution.params
-    residual = target - jnp.matmul(unit, x, precision="highest")
+    residual = target - matmul(unit, x)
     at_bound = jnp.any((x <= bounds[0]) | (x >= bounds[1]))
     state = solution.state
     return _Channel(x / lengths, residual, at_bound, state.iter_num, state.error, matrix)

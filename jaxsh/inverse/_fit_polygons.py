@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import is_concrete
+from .._core.checks import is_concrete
 from ..midrange import Polygon
 from ..transfer import Transfer
 from ._checks import check_data, check_end

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .. import sky as sky_room
+from .._core.linalg import matmul
 from ..transfer import Transfer
 from ._charts import even_hemisphere, from_hemisphere, tangents, to_hemisphere, to_interval
 from ._checks import check_data, check_end
@@ -190,7 +191,7 @@ def _confidence(shading, sky, value: SkyLight, variance, free: bool) -> Confiden
     along = tangents(value.sun)
 
     def moved(step) -> SkyLight:
-        sun = value.sun + jnp.matmul(step[:2], along, precision="highest")
+        sun = value.sun + matmul(step[:2], along)
         factor = value.exposure * jnp.exp(step[3]) if free else value.exposure
         return SkyLight(sun, value.turbidity + step[2], factor)
 

@@ -4,6 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._core.linalg import matmul
 from ..midrange import Polygon
 
 
@@ -56,5 +57,5 @@ def rotate(axes: Float[Array, "2 3"], q: Float[Array, " 3"]) -> Float[Array, "2 
     half = q / 2
     squared = jnp.sum(half * half)
     crossed = jnp.cross(half[None], axes)
-    along = jnp.matmul(axes, half, precision="highest")[:, None] * half[None]
+    along = matmul(axes, half)[:, None] * half[None]
     return ((1 - squared) * axes + 2 * along + 2 * crossed) / (1 + squared)

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._core.linalg import einsum
 from ..midrange import Polygon, polygon_harmonics
 from ..transfer import Transfer
 
@@ -27,7 +28,7 @@ class Shading(eqx.Module):
         """Of a light of the operator's degree or below."""
         operator = self.operator[..., : light.shape[-1]]
         operator = jnp.broadcast_to(operator, (3, *operator.shape[1:]))
-        shaded = jnp.einsum("crk,ck->cr", operator, light, precision="highest")
+        shaded = einsum("crk,ck->cr", operator, light)
         return shaded / self.scale - self.target
 
 

@@ -10,6 +10,7 @@ import optimistix as optx
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, Int
 
+from .._core.linalg import einsum, matmul
 from ._result import Confidence
 
 # Ends whose residuals differ by less than this, in units of the data, are in the same valley.
@@ -89,7 +90,7 @@ def covariance(jacobian: Float[Array, "r p"], variance: Float[Array, ""]) -> Flo
     # A column of rounding errors of the size of its elements is about eps long, however tall.
     full = singular[-1] > 10 * jnp.finfo(jacobian.dtype).eps * jacobian.shape[1]
     inverse = vt / jnp.where(full, singular, 1)[:, None] / jnp.where(lengths > 0, lengths, 1)[None]
-    spread = variance * jnp.matmul(inverse.T, inverse, precision="highest")
+    spread = variance * matmul(inverse.T, inverse)
     return jnp.where(full & jnp.all(lengths > 0), spread, jnp.inf)
 
 
@@ -105,7 +106,7 @@ def confidence(
     spread = covariance(jacobian, variance)
     whole = jnp.isfinite(spread).all()
     spread = jnp.where(whole, spread, 0)
-    spread = jnp.einsum("ip,pq,jq->ij", carried, spread, carried, precision="highest")
+    spread = einsum("ip,pq,jq->ij", carried, spread, carried)
     spread = jnp.where(whole, spread, jnp.inf)
     _, unravel = ravel_pytree(moved(still))
     return Confidence(spread, unravel(jnp.sqrt(jnp.maximum(jnp.diagonal(spread), 0))))

@@ -8,8 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Bool, Float
 
-from ..harmonics._checks import as_float
-from ..sphere._quadrature import check_size
+from .._core.checks import as_float, check_size
 from ._cube import RadianceCube, texels
 from ._polygon import Polygon
 from ._rows import Rows, dot

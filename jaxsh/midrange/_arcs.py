@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._core.xla import materialize
 from ..harmonics import degrees, evaluate
-from ..harmonics._fence import fenced
 from ..harmonics._tables import gradient_table
 from ._vectors import cross, dot, inverse_length, reciprocal, scale, unit
 
@@ -66,7 +66,7 @@ def coefficients(
         span, normal, triangle = arc
         if degree:
             nodes, weights = _nodes(span, degree)
-            integral = fenced(_integrate_even, _basis(nodes, degree - 1), weights)
+            integral = materialize(_integrate_even, _basis(nodes, degree - 1), weights)
             flux = flux + normal[:, None] * integral[None]
         return (flux, _product(turn, triangle)), None
 
@@ -114,9 +114,11 @@ def coefficients_with_gradient(
         span, normal, near, triangle = arc
         nodes, weights = _nodes(span, degree + 2)
         basis = _basis(nodes, degree)
-        change = fenced(_integrate_odd, basis, fenced(_times, weights, nodes, near))
+        change = materialize(_integrate_odd, basis, materialize(_times, weights, nodes, near))
         if degree:
-            flux = flux + normal[:, None] * fenced(_integrate_even, basis[:lower], weights)[None]
+            flux = (
+                flux + normal[:, None] * materialize(_integrate_even, basis[:lower], weights)[None]
+            )
         return (flux, pull + normal[:, None] * change[None], _product(turn, triangle)), None
 
     start, end, normal, near = arcs
@@ -203,7 +205,7 @@ def _nodes(span: _Spans, count: int) -> tuple[Float[Array, "3 count n"], Complex
         points = cos[None] * middle[:, None] + sin[None] * tangent[:, None]
         return points, (even, odd)
 
-    return fenced(nodes, *span)
+    return materialize(nodes, *span)
 
 
 def _times(weights: Complex, nodes: Float[Array, "3 j n"], slope: Float[Array, "3 n"]) -> Complex:
@@ -214,7 +216,7 @@ def _times(weights: Complex, nodes: Float[Array, "3 j n"], slope: Float[Array, "
 
 
 def _basis(nodes: Float[Array, "3 j n"], degree: int) -> Float[Array, "k j n"]:
-    return fenced(lambda rows: evaluate(jnp.moveaxis(rows, 0, -1), degree, axis=0), nodes)
+    return materialize(lambda rows: evaluate(jnp.moveaxis(rows, 0, -1), degree, axis=0), nodes)
 
 
 def _integrate_even(basis: Array, weights: tuple[Array, Array]) -> Float[Array, "k n"]:

@@ -7,8 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from ..harmonics._checks import as_float
-from ..sphere._quadrature import check_size
+from .._core.checks import as_float, check_size
 from ._cube import RadianceCube, texels
 from ._scene import Scene
 

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from ..harmonics._fence import fenced
+from .._core.xla import materialize
 from ._arcs import Arcs, Rows, edge_arcs
 from ._vectors import dot, reciprocal, scale, select
 
@@ -58,7 +58,9 @@ def clip_horizon(loops: Arcs, normal: Rows) -> Arcs:
     """The part above the plane through the receiver with this unit normal, (3, receivers)."""
     normal = normal[None, None]
     plane = -normal, jnp.zeros_like(normal)
-    return joined(*fenced(clip, loops, dot(normal, loops.start), dot(normal, loops.end), plane))
+    return joined(
+        *materialize(clip, loops, dot(normal, loops.start), dot(normal, loops.end), plane)
+    )
 
 
 def clip_cone(loops: Arcs, cone: Arcs, turn: Array) -> Arcs:
@@ -71,7 +73,7 @@ def clip_cone(loops: Arcs, cone: Arcs, turn: Array) -> Arcs:
     def cut(loops, plane):
         i, outward, near = plane
         sides = -dot(outward, loops.start), -dot(outward, loops.end)
-        kept, closing = fenced(clip, loops, *sides, (outward, near))
+        kept, closing = materialize(clip, loops, *sides, (outward, near))
         put = jax.lax.dynamic_update_slice_in_dim
         return jax.tree.map(lambda a, b: put(a, b, present + i, axis=1), kept, closing), None
 

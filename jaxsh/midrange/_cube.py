@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..harmonics._checks import as_float
+from .._core.checks import as_float
 from ..sphere import Quadrature, cube_map
 
 

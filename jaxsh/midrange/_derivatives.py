@@ -6,13 +6,13 @@ for a function y_l(x/|x|) |x|^a, homogeneous of degree a,
     ∂_d = (a - l) · (the part of degree l+1)  +  (a + l + 1) · (the part of degree l-1).
 """
 
-import functools
 import itertools
 import math
 
 import numpy as np
 from jaxtyping import Float
 
+from .._core.host import read_only_cache
 from ..harmonics import degrees
 from ..harmonics._tables import gradient_table
 
@@ -22,7 +22,7 @@ def monomials(order: int) -> list[tuple[int, ...]]:
     return list(itertools.combinations_with_replacement(range(3), order))
 
 
-@functools.lru_cache(maxsize=32)
+@read_only_cache(maxsize=32)
 def times_direction(degree: int) -> Float[np.ndarray, "3 k k_up"]:
     """X_d[i, j] = ∫ ω_d y_i y_j dω, i up to `degree` and j up to degree + 1."""
     table, l = gradient_table(degree + 1), degrees(degree + 1)
@@ -40,7 +40,7 @@ def derivative(degree: int, homogeneity: int) -> Float[np.ndarray, "3 k k_up"]:
     return times_direction(degree) * np.where(up > l, homogeneity - l, homogeneity + l + 1)
 
 
-@functools.lru_cache(maxsize=32)
+@read_only_cache(maxsize=32)
 def taylor_matrices(degree: int, order: int) -> Float[np.ndarray, "m k k_up"]:
     """The terms of one order of y_i(s/|s|)/|s|³ at s = ω - δ: Σ_α δ^α Σ_j T_α[i, j] y_j(ω).
 

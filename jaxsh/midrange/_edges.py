@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from .._core.linalg import matmul
 from ..harmonics import evaluate
 from ..sphere import cube_map
 from ._cube import RadianceCube, inverse_distances
@@ -40,7 +41,7 @@ def edge_gradient(cube: RadianceCube, edges: Edges) -> Float[Array, "3 k 3"]:
     jump = (second[:, :3] - first[:, :3]) * jnp.maximum(nearest, 0)[:, None]
     moved = (jump[:, :, None] * edges.normals[:, None, :]).reshape(-1, 9)
     moved = jnp.concatenate([moved, jnp.zeros_like(moved, shape=(len(moved), 7))], axis=1)
-    gradient = jnp.matmul(edges.table, moved, precision="highest")[:, :9]
+    gradient = matmul(edges.table, moved)[:, :9]
     return jnp.moveaxis(gradient.reshape(-1, 3, 3), 0, 1)
 
 

@@ -3,8 +3,8 @@
 import equinox as eqx
 from jaxtyping import Array, Float
 
+from .._core.checks import as_float
 from ..geometry import Mesh
-from ..harmonics._checks import as_float
 
 
 class EmissiveMesh(eqx.Module):

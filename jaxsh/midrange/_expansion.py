@@ -8,8 +8,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import align, as_float
+from .._core.linalg import einsum
 from ..harmonics import degree_of
-from ..harmonics._checks import align, as_float
 
 _ORDERS = {1: 0, 4: 1, 10: 2, 20: 3}  # by the number of monomials up to that order
 
@@ -127,7 +128,7 @@ def _extrapolate(expansion: Expansion, positions: Float[Array, "*batch 3"]) -> A
     point, terms = expansion.point.astype(positions.dtype), expansion.terms
     powers = monomials(jnp.subtract(*align(positions, point)), expansion.order)
     if point.ndim == 1:
-        return jnp.einsum("...m,ckm->...ck", powers, terms, precision="highest")
+        return einsum("...m,ckm->...ck", powers, terms)
     powers, terms = align(powers[..., None, None, :], terms)
     return jnp.sum(powers * terms, axis=-1)
 

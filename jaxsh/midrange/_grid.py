@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from ..harmonics._checks import as_float, is_concrete
+from .._core.checks import as_float, is_concrete
 from ._expansion import check_positions
 from ._weights import Cells, Weights
 

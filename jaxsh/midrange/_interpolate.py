@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.linalg import matmul
 from ._blend import Rule, check_weights, over_samples, rule_terms, take_rows
 from ._expansion import Expansion, check_positions, monomials
 from ._weights import Weights
@@ -60,7 +61,7 @@ def _interpolate(expansions, weights, positions, rule):
         factors = values[..., None] * monomials(offsets, order)
         factors = factors.reshape(*factors.shape[:-2], -1)
         rows = jnp.moveaxis(terms, -1, -3).reshape(*terms.shape[:-4], factors.shape[-1], -1)
-        return total + jnp.matmul(factors, rows, precision="highest")
+        return total + matmul(factors, rows)
 
     start = jnp.zeros((*positions.shape[:-1], shape[1] * shape[2]), terms.dtype)
     light = over_samples(add, start, values, points, terms)

@@ -14,6 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from .._core.host import read_only_cache
+from .._core.linalg import matmul
 from ..harmonics import degrees, evaluate, orders
 from ._cube import texels
 
@@ -51,7 +53,7 @@ def moments(
 ) -> Float[Array, "k c"]:
     """All columns' moments up to the tables' degree."""
     folded = _fold(columns, resolution)
-    products = [jnp.matmul(t, f, precision="highest") for t, f in zip(tables, folded, strict=True)]
+    products = [matmul(t, f) for t, f in zip(tables, folded, strict=True)]
     rows = np.concatenate([each.rows for each in _parities(resolution, degree)])
     order = np.argsort(rows, kind="stable").reshape(-1, 3).T
     x, y, z = (jnp.concatenate(products)[i] for i in order.astype(np.int32))
@@ -79,7 +81,7 @@ def _fold(columns: Float[Array, "n c"], resolution: int) -> list[Float[Array, "m
     return result
 
 
-@functools.lru_cache(maxsize=32)
+@read_only_cache(maxsize=32)
 def _parities(resolution: int, degree: int) -> list[_Parity]:
     l, m = degrees(degree), orders(degree)
     y, z = (

@@ -4,7 +4,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..harmonics._checks import as_float, is_concrete
+from .._core.checks import as_float, is_concrete
 
 # A vertex may be this far out of the plane, as a share of the polygon's extent.
 _FLAT = {np.dtype(np.float64): 1e-9, np.dtype(np.float32): 1e-5}

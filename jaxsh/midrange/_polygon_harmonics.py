@@ -9,8 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import align, as_float, check_batches, is_concrete
-from ..harmonics._indexing import check_degree
+from .._core.checks import align, as_float, check_batches, check_degree, is_concrete
 from ._polygon import Polygon, is_convex
 from ._visible import Plan, Scene, seen
 

@@ -2,7 +2,7 @@
 
 from jaxtyping import Array, Float
 
-from ..harmonics._indexing import check_degree
+from .._core.checks import check_degree
 from ._cube import RadianceCube
 from ._edges import edge_gradient, edge_table
 from ._taylor import each, project_cube, taylor

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import as_float
 from ..geometry import Mesh, RayScene
-from ..harmonics._checks import as_float
 from ..imaging import look_up
 from ..sphere import cube_map
 from ._emissive import EmissiveMesh

@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import align, as_float
+from .._core.checks import align, as_float
+from .._core.linalg import matmul
 from ..transfer import Transfer
 from ._blend import Rule, check_weights, over_samples, rule_terms, take_rows
 from ._expansion import Expansion, monomial_list
@@ -112,5 +113,5 @@ def _products(coefficients, terms):
     columns = columns.reshape(*terms.shape[:-4], terms.shape[-2], -1)
     width = columns.shape[-1]
     columns = jnp.pad(columns, [(0, 0)] * (columns.ndim - 1) + [(0, -width % 8)])
-    products = jnp.matmul(coefficients, columns, precision="highest")
+    products = matmul(coefficients, columns)
     return (products[..., start : start + 3] for start in range(0, width, 3))

@@ -7,9 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import align, as_float, check_degree, is_concrete
 from ..harmonics import degrees, evaluate, evaluate_with_gradient
-from ..harmonics._checks import align, as_float, is_concrete
-from ..harmonics._indexing import check_degree
 from ._sphere import Sphere
 
 

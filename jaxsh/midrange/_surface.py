@@ -14,11 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import as_float, check_degree, check_size
+from .._core.linalg import matmul
 from ..harmonics import evaluate, evaluate_with_gradient
-from ..harmonics._checks import as_float
-from ..harmonics._indexing import check_degree
 from ..sphere import fibonacci
-from ..sphere._quadrature import check_size
 from ._surfaces import Emitter, spheres, triangles
 
 
@@ -109,7 +108,7 @@ def _at_points(project, samples, point, degree):
 def _project(samples: SurfaceSamples, point: Float[Array, " 3"], degree: int):
     s = samples.points - point[None]
     light = (_geometry(samples, s) * samples.areas)[:, None] * samples.radiance
-    return _matmul(evaluate(s, degree, axis=0), light).T
+    return matmul(evaluate(s, degree, axis=0), light).T
 
 
 @functools.partial(jax.jit, static_argnames="degree")
@@ -124,9 +123,9 @@ def _project_with_gradient(samples: SurfaceSamples, point: Float[Array, " 3"], d
     power = samples.areas[:, None] * samples.radiance
     light = g[:, None] * power
     moved = power[:, :, None] * slope_of_g[:, None, :]
-    gradient = jnp.moveaxis(_matmul(slope, light[None]), 0, -1)  # K, 3 colours, 3 axes
-    gradient += _matmul(basis, moved.reshape(-1, 9)).reshape(-1, 3, 3)
-    return _matmul(basis, light).T, -jnp.moveaxis(gradient, 0, 1)
+    gradient = jnp.moveaxis(matmul(slope, light[None]), 0, -1)  # K, 3 colours, 3 axes
+    gradient += matmul(basis, moved.reshape(-1, 9)).reshape(-1, 3, 3)
+    return matmul(basis, light).T, -jnp.moveaxis(gradient, 0, 1)
 
 
 def _geometry(samples: SurfaceSamples, s: Float[Array, "n 3"]) -> Float[Array, " n"]:
@@ -137,7 +136,3 @@ def _geometry(samples: SurfaceSamples, s: Float[Array, "n 3"]) -> Float[Array, "
 
 def _dot(a: Float[Array, "n 3"], b: Float[Array, "n 3"]) -> Float[Array, " n"]:
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
-
-
-def _matmul(a, b):
-    return jnp.matmul(a, b, precision="highest")

@@ -13,8 +13,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._core.checks import check_degree
+from .._core.linalg import einsum
 from ..harmonics import num_coefficients
-from ..harmonics._indexing import check_degree
 from ._cube import RadianceCube, inverse_distances
 from ._derivatives import monomials, taylor_matrices
 from ._expansion import Expansion
@@ -75,8 +76,8 @@ def _terms(cube, tables, degree: int, order: int) -> Float[Array, "3 k m"]:
         here, before = (jnp.asarray(taylor_matrices(degree, j), dtype) for j in (k, k - 1))
         radiance = radiance[:, : here.shape[-1]]
         planes = planes[:, : before.shape[-1]].reshape(3, 3, before.shape[-1])
-        moved = _einsum("mij,cj->cim", here, radiance)
-        turned = _einsum("mij,cdj->cidm", before, planes)
+        moved = einsum("mij,cj->cim", here, radiance)
+        turned = einsum("mij,cdj->cidm", before, planes)
         # The product of q·d and the terms of one order less.
         lower = {axes: i for i, axes in enumerate(monomials(k - 1))}
         for i, axes in enumerate(monomials(k)):
@@ -102,7 +103,3 @@ def _columns(cube: RadianceCube, order: int) -> Float[Array, "n c"]:
             planes = planes * inverse
     missing = -sum(column.shape[1] for column in columns) % 8
     return jnp.concatenate([*columns, jnp.zeros_like(radiance, shape=(len(radiance), missing))], 1)
-
-
-def _einsum(subscripts: str, *operands):
-    return jnp.einsum(subscripts, *operands, precision="highest")

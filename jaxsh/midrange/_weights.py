@@ -9,7 +9,8 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
-from ..harmonics._checks import as_float
+from .._core.checks import as_float
+from .._core.linalg import matmul
 from ._expansion import check_positions
 
 Rows = tuple[Array, Array, Array]
@@ -188,9 +189,7 @@ def _span(points: Float[Array, "s 3"]) -> Float[Array, "3 3"]:
     """The projection onto the directions that lead from sample to sample, to half the digits."""
     _, size, axes = jnp.linalg.svd(points - jnp.mean(points, axis=0)[None], full_matrices=False)
     spanned = size > size[:1] * math.sqrt(jnp.finfo(points.dtype).eps)
-    return lax.stop_gradient(
-        jnp.matmul(axes.T * spanned.astype(axes.dtype)[None], axes, precision="highest")
-    )
+    return lax.stop_gradient(matmul(axes.T * spanned.astype(axes.dtype)[None], axes))
 
 
 def _along(projection: Float[Array, "3 3"], rows: list[Array]) -> list[Array]:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import align, as_float
+from .._core.checks import align, as_float
 
 
 class Angles(NamedTuple):

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import align, check_batches
+from .._core.checks import align, check_batches
 from ._angles import angles, directions, parameter
 from ._preetham import gradation
 from ._validity import Check, check_option, check_sun

@@ -1,11 +1,12 @@
 """From a sky's chromaticity and luminance to XYZ and linear sRGB."""
 
-import functools
 from typing import Literal, get_args
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+
+from .._core.host import read_only_cache
 
 Space = Literal["srgb", "xyz", "xyY"]
 
@@ -14,7 +15,7 @@ _PRIMARIES = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])
 _WHITE = np.array([0.3127, 0.3290])
 
 
-@functools.cache
+@read_only_cache(maxsize=None)
 def xyz_to_srgb() -> Float[np.ndarray, "3 3"]:
     """Matrix from XYZ to linear sRGB, derived from primaries and white in full precision.
 

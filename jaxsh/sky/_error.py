@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import align, as_float
+from .._core.checks import align, as_float
+from .._core.linalg import matmul
 from ..sphere import reconstruct
 from ._angles import directions, parameter
 from ._colour import xyz_to_srgb
@@ -85,7 +86,7 @@ def smallest_luminance(
 
 def _smallest(views, sun, turbidity):
     xyz = preetham_radiance(views, sun, turbidity, space="xyz", check="allow")
-    srgb = jnp.matmul(xyz, jnp.asarray(xyz_to_srgb().T, xyz.dtype), precision="highest")
+    srgb = matmul(xyz, jnp.asarray(xyz_to_srgb().T, xyz.dtype))
     return xyz[:, 1:2].min(axis=0), srgb.min(axis=0)
 
 

@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import check_degree
+from .._core.linalg import einsum, matmul
 from ..harmonics import orders
-from ..harmonics._indexing import check_degree
 from ._azimuth import half_rows
 from ._chebyshev import Axis, monomials
 from ._project import Model, project
@@ -107,7 +108,7 @@ def _reweighted(solve, mix, weights, rounds: int) -> tuple[Float[Array, "..."], 
     emphasis, best, least = jnp.ones_like(weights), None, np.inf
     for _ in range(rounds + 1):
         values, solution, errors = solve(weights * jnp.sqrt(emphasis))
-        mixed = jnp.einsum("oq,qrs->ors", mix, errors, precision="highest")
+        mixed = einsum("oq,qrs->ors", mix, errors)
         mean = weights * jnp.sqrt(jnp.sum(mixed**2, axis=1)).max(axis=0)
         if best is None or float(mean.max()) < least:
             best, least = (values, solution), float(mean.max())
@@ -121,7 +122,7 @@ def _solve(columns, targets, scales, weights, *, solver, max_steps):
     flat = (targets.shape[0] * targets.shape[1], targets.shape[-1])
     weighted = [(weights[None, None] * a).reshape(flat) for a in (targets, scales)]
     values, solution = least_squares(columns, *weighted, solver=solver, max_steps=max_steps)
-    fitted = jnp.matmul(values, columns.T, precision="highest").reshape(targets.shape)
+    fitted = matmul(values, columns.T).reshape(targets.shape)
     return values, solution, scales * fitted - targets
 
 
@@ -174,7 +175,7 @@ def _check_symmetry(model: Model, suns, numbers) -> None:
 
 
 def _times(vectors, matrix):
-    return jnp.matmul(vectors, matrix.T, precision="highest")
+    return matmul(vectors, matrix.T)
 
 
 def _check_finite(exact, theta, numbers) -> None:

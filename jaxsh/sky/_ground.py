@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import align, as_float, check_batches, is_concrete
 from ..harmonics import degree_of, index, num_coefficients
-from ..harmonics._checks import align, as_float, check_batches, is_concrete
 
 
 def horizontal_irradiance(

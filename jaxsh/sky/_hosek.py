@@ -1,6 +1,5 @@
 """Hosek and Wilkie's sky (2012), from the tables that the installed `mitsuba` wheel carries."""
 
-import functools
 import importlib.util
 import math
 import pathlib
@@ -10,7 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import align, check_batches
+from .._core.checks import align, check_batches
+from .._core.host import read_only_cache
+from .._core.linalg import einsum
 from ._angles import angles, directions, parameter
 from ._tensor_file import read_tensors
 from ._validity import Check, check_option, check_range, check_sun
@@ -97,9 +98,7 @@ def _interpolated(tables, theta_sun, turbidity, albedo):
         jnp.broadcast_to(t, (*_batch(along, hats, albedo), t.shape[-1]))
         for t in (along, hats, albedo)
     )
-    numbers = jnp.einsum(
-        "...t,...a,...e,taecp->cp...", hats, albedo, along, tables, precision="highest"
-    )
+    numbers = einsum("...t,...a,...e,taecp->cp...", hats, albedo, along, tables)
     return [tuple(channel) for channel in numbers]
 
 
@@ -107,7 +106,7 @@ def _batch(*arrays):
     return jnp.broadcast_shapes(*(a.shape[:-1] for a in arrays))
 
 
-@functools.cache
+@read_only_cache(maxsize=None)
 def _tables() -> Float[np.ndarray, "10 2 6 3 10"]:
     """By turbidity, albedo, control point, channel: nine shape parameters and the mean."""
     tensors = read_tensors(_table_path())

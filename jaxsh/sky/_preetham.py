@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import align, check_batches
+from .._core.checks import align, check_batches
 from ._angles import Angles, angles, directions, parameter
 from ._colour import Space, check_space, from_xyy
 from ._preetham_constants import Coefficients, Constants, Matrix, preetham_constants

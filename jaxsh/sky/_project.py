@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import as_float, check_batches, check_degree, flatten_batch
+from .._core.linalg import einsum
 from ..harmonics import degrees, evaluate, orders, rotate_z
-from ..harmonics._checks import as_float, check_batches, flatten_batch
-from ..harmonics._indexing import check_degree
 from ._angles import directions, parameter
 from ._colour import Space, check_space
 from ._preetham import preetham_radiance
@@ -153,7 +153,7 @@ def _integrate(model, degree, sun, parameters, *, symmetric: bool, refine: int =
         )
     moments = _along_azimuth(values.reshape(*ahead.shape, -1), grid, degree, symmetric)
     profiles = _profiles(grid.theta, degree) * grid.theta_weights[None]
-    coefficients = jnp.einsum("tck,kt->ck", moments, profiles, precision="highest")
+    coefficients = einsum("tck,kt->ck", moments, profiles)
     return rotate_z(coefficients, azimuth)
 
 
@@ -163,7 +163,7 @@ def _along_azimuth(values, grid, degree: int, symmetric: bool):
     sine = np.zeros_like(grid.phi)[None] if symmetric else np.sin(-m * grid.phi)
     waves = np.where(m < 0, sine, np.cos(m * grid.phi)) * grid.phi_weights
     waves = jnp.asarray(waves, values.dtype)
-    moments = jnp.einsum("tpc,mp->tcm", values, waves, precision="highest")
+    moments = einsum("tpc,mp->tcm", values, waves)
     return moments[..., orders(degree) + degree]
 
 

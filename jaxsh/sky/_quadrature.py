@@ -7,12 +7,13 @@ towards both ends of each and do not ask what kind of singularity is there, whic
 the nodes of Gauss–Legendre panels graded to the same points for the same error.
 """
 
-import functools
 from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+
+from .._core.host import read_only_cache
 
 # Steps that reach 1e-13 of the norm for Preetham's sky, and how far the trapezoidal rule goes.
 _THETA_STEP, _PHI_STEP = 0.06, 0.08
@@ -49,7 +50,7 @@ def sky_grid(
     return SkyGrid(theta, theta_weights, *both)
 
 
-@functools.lru_cache(maxsize=16)
+@read_only_cache(maxsize=16)
 def tanh_sinh(step: float) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Takahasi and Mori's (1974) nodes and weights on [0, 1].
 

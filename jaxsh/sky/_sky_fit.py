@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import align, check_batches, is_concrete
-from ..harmonics._indexing import check_degree
+from .._core.checks import align, check_batches, check_degree, is_concrete
+from .._core.linalg import einsum, matmul
 from ._angles import directions, parameter, unit
 from ._azimuth import row_of_each, squared_zenith_angle, waves, zenith_angle
 from ._chebyshev import Axis, chebyshev, tensor
@@ -110,10 +110,10 @@ def _evaluate(fit: SkyFit, sun, parameters):
     channels, rows, *terms = fit.coefficients.shape
     basis = design(fit.axes, variables, terms)
     series = fit.coefficients.reshape(channels * rows, len(basis)).astype(sun.dtype)
-    values = jnp.matmul(series, basis, precision="highest").reshape(channels, rows, len(x))
+    values = matmul(series, basis).reshape(channels, rows, len(x))
     if fit.prefactor is not None:
         values = values * fit.prefactor(suns, *numbers).T[:, None]
-    values = jnp.einsum("oc,crn->orn", fit.mix.astype(sun.dtype), values, precision="highest")
+    values = einsum("oc,crn->orn", fit.mix.astype(sun.dtype), values)
     turned = values[:, row_of_each(fit.degree)] * waves(x, y, fit.degree, smooth=fit.parity)[None]
     inside = jnp.stack([axis.holds(v) for axis, v in zip(fit.axes, variables, strict=True)])
     turned = jnp.where(inside.all(axis=0)[None, None], turned, jnp.nan)

@@ -1,9 +1,9 @@
 """Spectra for sunlight through the atmosphere, every 10 nm from 380 to 750 nm, on the host."""
 
-import functools
-
 import numpy as np
 from jaxtyping import Float
+
+from .._core.host import read_only_cache
 
 WAVELENGTHS = np.arange(380.0, 751.0, 10.0)  # nm
 STEP = 10.0
@@ -38,7 +38,7 @@ OZONE = _absorption(
 WATER = _absorption(690.0, 0.016, 0.024, 0.0125, 1.0, 0.87, 0.061, 0.001)
 
 
-@functools.cache
+@read_only_cache(maxsize=None)
 def colour_matching() -> Float[np.ndarray, "3 wavelengths"]:
     """x̄, ȳ, z̄ of the CIE 1931 observer by the lobes of Wyman, Sloan and Shirley (2013), eq. 4."""
 

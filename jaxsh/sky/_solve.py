@@ -9,6 +9,8 @@ import lineax as lx
 import optimistix as optx
 from jaxtyping import Array, Float, Int
 
+from .._core.linalg import matmul
+
 Solver = Literal["gauss-newton", "levenberg-marquardt", "qr"] | optx.AbstractLeastSquaresSolver
 
 
@@ -45,7 +47,7 @@ def least_squares(
     values, steps, results = _solve(
         design, targets, scales, _named(solver, design.dtype), max_steps
     )
-    fitted = jnp.matmul(values, design.T, precision="highest")
+    fitted = matmul(values, design.T)
     residual = jnp.linalg.norm(scales * fitted - targets) / jnp.linalg.norm(targets)
     failed = results != optx.RESULTS.successful
     worst = jnp.argmax(failed) if failed.any() else jnp.argmax(steps)
@@ -79,7 +81,7 @@ def _solve(design, targets, scales, solver, max_steps):
 
     def iterative(target, scale):
         def residual(c, _):
-            return scale * jnp.matmul(design, c, precision="highest") - target
+            return scale * matmul(design, c) - target
 
         start = jnp.zeros(design.shape[-1], design.dtype)
         solution = optx.least_squares(residual, solver, start, max_steps=max_steps, throw=False)

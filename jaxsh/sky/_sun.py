@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import align, check_batches, check_degree
+from .._core.linalg import matmul
 from ..harmonics import degrees, evaluate
-from ..harmonics._checks import align, check_batches
-from ..harmonics._indexing import check_degree
 from ._angles import angles, directions, parameter
 from ._colour import Space, check_space, from_xyz
 from ._solar_tables import OZONE, SOLAR_RADIANCE, STEP, WATER, WAVELENGTHS, colour_matching
@@ -98,9 +98,7 @@ def _radiance(sun, turbidity, space: Space):
     mass = optical_mass(geometry.theta_sun, geometry.cos_sun)
     spectrum = _transmittance(*(t[..., None] for t in jnp.broadcast_arrays(mass, turbidity)))
     weights = _KILOLUMENS_PER_WATT * STEP * colour_matching() * SOLAR_RADIANCE
-    x, y, z = jnp.moveaxis(
-        jnp.matmul(spectrum, jnp.asarray(weights.T, sun.dtype), precision="highest"), -1, 0
-    )
+    x, y, z = jnp.moveaxis(matmul(spectrum, jnp.asarray(weights.T, sun.dtype)), -1, 0)
     above = (geometry.cos_sun >= 0)[..., None]
     return jnp.where(above, from_xyz(x, y, z, space), 0)
 

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 import numpy as np
 from jaxtyping import Array
 
-from ..harmonics._checks import is_concrete
+from .._core.checks import is_concrete
 
 Check = Literal["raise", "warn", "allow"]
 

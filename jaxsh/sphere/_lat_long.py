@@ -7,14 +7,14 @@ all that its coefficients need: W·H·(2L+1) + H·K multiplications in place of 
 import functools
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import as_float, check_degree, check_size
+from .._core.host import read_only_cache
+from .._core.linalg import einsum
 from ..harmonics import degree_of, degrees, index, legendre, orders
-from ..harmonics._checks import as_float
-from ..harmonics._indexing import check_degree
-from ._quadrature import check_size, fejer_weights
+from ._quadrature import fejer_weights
 
 
 def project_lat_long(image: Float[ArrayLike, "h w c"], degree: int) -> Float[Array, "c k"]:
@@ -58,8 +58,8 @@ def _project(image, degree: int):
     height, width, _ = image.shape
     meridians, azimuths = _tables(height, width, degree)
     weights = fejer_weights(height) * 2 * np.pi / width
-    along_rows = _einsum("hwc,mw->mhc", image, azimuths.astype(image.dtype))
-    padded = _einsum("mhc,mlh->cml", along_rows, (meridians * weights).astype(image.dtype))
+    along_rows = einsum("hwc,mw->mhc", image, azimuths.astype(image.dtype))
+    padded = einsum("mhc,mlh->cml", along_rows, (meridians * weights).astype(image.dtype))
     l, m = degrees(degree), orders(degree)
     return padded[:, m + degree, l]
 
@@ -74,11 +74,11 @@ def _reconstruct(coefficients, height: int, width: int):
         dtype=np.int32,
     )
     dtype = coefficients.dtype
-    along_rows = _einsum("cml,mlh->mhc", coefficients[:, place], meridians.astype(dtype))
-    return _einsum("mhc,mw->hwc", along_rows, azimuths.astype(dtype))
+    along_rows = einsum("cml,mlh->mhc", coefficients[:, place], meridians.astype(dtype))
+    return einsum("mhc,mw->hwc", along_rows, azimuths.astype(dtype))
 
 
-@functools.lru_cache(maxsize=32)
+@read_only_cache(maxsize=32)
 def _tables(
     height: int, width: int, degree: int
 ) -> tuple[Float[np.ndarray, "m l h"], Float[np.ndarray, "m w"]]:
@@ -89,7 +89,3 @@ def _tables(
     meridians[orders(degree) + degree, degrees(degree)] = legendre(np.cos(theta), degree)
     m = np.arange(-degree, degree + 1)[:, None]
     return meridians, np.where(m < 0, np.sin(-m * phi), np.cos(m * phi))
-
-
-def _einsum(subscripts: str, *operands):
-    return jnp.einsum(subscripts, *operands, precision="highest")

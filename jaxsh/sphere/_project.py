@@ -9,9 +9,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import as_float, check_degree, flatten_batch
+from .._core.linalg import matmul
 from ..harmonics import degree_of, evaluate
-from ..harmonics._checks import as_float, flatten_batch
-from ..harmonics._indexing import check_degree
 from ._quadrature import Quadrature
 
 # Directions per block: 1 MB of basis at degree 10 in float32.
@@ -60,7 +60,7 @@ def _project(values, quadrature, degree: int):
     def add(total, block):
         directions, values = block
         basis = evaluate(directions, degree, axis=0)
-        return total + jnp.matmul(basis, values, precision="highest"), None
+        return total + matmul(basis, values), None
 
     start = jnp.zeros(((degree + 1) ** 2, len(weighted)), values.dtype)
     total, _ = jax.lax.scan(add, start, (directions, blocks))
@@ -75,7 +75,7 @@ def _reconstruct(coefficients, directions):
     @jax.checkpoint
     def block(directions):
         basis = evaluate(directions.astype(rows.dtype), degree, axis=0)
-        return jnp.matmul(rows, basis, precision="highest")
+        return matmul(rows, basis)
 
     blocks = jax.lax.map(block, _blocks(directions, pad=(0, 0, 1)))
     values = jnp.moveaxis(blocks, 0, 1).reshape(len(rows), blocks.shape[0] * blocks.shape[-1])

@@ -1,13 +1,12 @@
 """Quadratures of the sphere: directions with weights that sum to 4π."""
 
-import operator
-
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..harmonics._grid import exact_grid
+from .._core.checks import check_size
+from ..harmonics._tables import exact_grid
 
 
 class Quadrature(eqx.Module):
@@ -107,13 +106,3 @@ def fejer_weights(height: int) -> Float[np.ndarray, " height"]:
 def _quadrature(directions: np.ndarray, weights: np.ndarray) -> Quadrature:
     dtype = jnp.result_type(float)
     return Quadrature(jnp.asarray(directions, dtype), jnp.asarray(weights, dtype))
-
-
-def check_size(name: str, value: int, least: int = 1) -> int:
-    try:
-        size = operator.index(value)
-    except TypeError:
-        size = least - 1
-    if size < least:
-        raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
-    return size

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from .. import geometry
+from .._core.checks import check_degree
 from ..geometry import Mesh, RayScene
-from ..harmonics._indexing import check_degree
 from ._blocks import Blocks, progress_bar
 from ._checkpoint import Checkpoint, fingerprint
 from ._directions import guided, turned_fibonacci

@@ -6,6 +6,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Num
 
+from .._core.linalg import matmul
+
 # Sums side by side: a term waits for the one before it in its own sum alone.
 _CHAINS = 8
 
@@ -43,4 +45,4 @@ def _written_out(weights, values):
 
 
 def _as_matrices(weights, values):
-    return jnp.matmul(weights, values.astype(weights.dtype), precision="highest")
+    return matmul(weights, values.astype(weights.dtype))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from ..geometry._rays import cores
+from .._core.host import cores
 from ._checkpoint import Checkpoint
 from ._gather import TILE
 

@@ -3,8 +3,8 @@
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import as_float
 from ..harmonics import degree_of
-from ..harmonics._checks import as_float
 from ._material import Material
 
 

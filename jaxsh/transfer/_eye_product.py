@@ -8,14 +8,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import as_float, check_degree
+from .._core.linalg import tall_product
 from ..harmonics import degree_of, num_coefficients
-from ..harmonics._checks import as_float
-from ..harmonics._indexing import check_degree
 from ._checks import checked_eye, checked_material
 from ._lobe import lobe_polynomial, reflected
 from ._lobe_products import lobe_products
 from ._material import Material
-from ._shade import tall_product
 from ._transfer import Transfer
 
 

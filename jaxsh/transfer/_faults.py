@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from .._core.checks import check_size
 from ..geometry import Mesh
-from ..sphere._quadrature import check_size
 
 
 def check_arguments(

@@ -4,10 +4,10 @@ import math
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from .._core.linalg import matmul
 from ..geometry import Hit
 from ._directions import Directions
 from ._receivers import Receivers, Surface
@@ -142,4 +142,4 @@ def _in_tiles(
 
 @jax.jit
 def _product(left: Array, right: Array) -> Array:
-    return jnp.matmul(left, right, precision="highest")
+    return matmul(left, right)

@@ -7,8 +7,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import align
+from .._core.linalg import tall_product
 from ..harmonics import degree_of
-from ..harmonics._checks import align
 from ._checks import checked_eye, checked_light, checked_material
 from ._light_product import LightProduct, seen
 from ._lobe import lobe_polynomial, mirrored, reflected
@@ -16,7 +17,6 @@ from ._lobe_products import lobe_products
 from ._material import Material
 from ._quantized import QuantizedTransfer
 from ._sampled import SampledTransfer
-from ._shade import tall_product
 from ._transfer import Transfer
 
 

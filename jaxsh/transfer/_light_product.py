@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.linalg import matmul
 from ..harmonics import convolve, degree_of, evaluate, num_coefficients, phong, product_matrix
 from ._checks import checked_light
 from ._layout import in_tiles, out_of_tiles, rows_in_tiles
@@ -44,7 +45,7 @@ def _light_product(light, transfer):
     rows = jnp.concatenate([matrix, light])
 
     def tile(coefficients):
-        products = jnp.matmul(rows, coefficients.T, precision="highest")
+        products = matmul(rows, coefficients.T)
         return products[:-3].reshape(3, width, -1), products[-3:]
 
     radiance, irradiance = jax.lax.map(tile, rows_in_tiles(transfer.coefficients[:, :width]))

@@ -8,9 +8,11 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.polynomial import Polynomial
 
+from .._core.host import read_only_cache
+from .._core.linalg import PRECISION
+from .._core.vectors import normalize
+from .._core.xla import materialize
 from ..harmonics import phong
-from ..harmonics._fence import fenced
-from ..harmonics._unit import normalize
 
 
 @functools.partial(jax.jit, static_argnums=3)
@@ -34,7 +36,9 @@ def rows_of(
 ) -> tuple[Float[Array, "3 v"], Float[Array, "3 v"]]:
     """What `mirrored` takes: components first, normals at unit length."""
     # Once, where XLA would take rows out of columns again for each component of what follows.
-    return fenced(lambda positions, normals: (positions.T, unit(normals.T)), positions, normals)
+    return materialize(
+        lambda positions, normals: (positions.T, unit(normals.T)), positions, normals
+    )
 
 
 def mirrored(
@@ -61,7 +65,7 @@ def mirrored(
         return inverse, 2 * cosine * inverse
 
     # These two are divisions and a root, which each component would take anew.
-    inverse, twice_cosine = fenced(scales, eye, positions, normals)
+    inverse, twice_cosine = materialize(scales, eye, positions, normals)
     there = towards(eye, positions, normals)
     return twice_cosine[None] * normals - inverse[None] * there
 
@@ -84,7 +88,7 @@ def lobe_polynomial(
     of [0, 1] they stay small, where powers of t alone would cancel each other.
     """
     zonal = jnp.moveaxis(phong(exponent, degree, normalized=normalized), -1, 0)
-    return jnp.tensordot(jnp.asarray(_powers(degree), zonal.dtype), zonal, 1, precision="highest")
+    return jnp.tensordot(jnp.asarray(_powers(degree), zonal.dtype), zonal, 1, precision=PRECISION)
 
 
 def lobe(t: Float[Array, "..."], polynomial: Float[Array, "bands ..."]) -> Float[Array, "..."]:
@@ -106,7 +110,7 @@ def unit(vectors: Float[Array, "3 v"]) -> Float[Array, "3 v"]:
     return jnp.where(defined, unit[:, 0], 0.0)
 
 
-@functools.lru_cache(maxsize=16)
+@read_only_cache(maxsize=16)
 def _powers(degree: int) -> Float[np.ndarray, "bands bands"]:
     """From g_l to the coefficients of E and O."""
     # P_l(t) is p_l(u), or t p_l(u) for odd l: Bonnet's recursion with t² = u + ½.

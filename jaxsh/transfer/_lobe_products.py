@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._core.linalg import matmul
 from ..harmonics import degree_of
 from ._lobe import lobe
 from ._nodes import node_passes
@@ -21,7 +22,7 @@ def lobe_products(
     width = lights.shape[-1]
     nodes = node_passes(degree_of(width))
     directions, basis, project = (jnp.asarray(array, axis.dtype) for array in nodes)
-    weights = _matmul(lights[None], project)
+    weights = matmul(lights[None], project)
     sampled = isinstance(transfer, SampledTransfer)
     parts = directions, weights, transfer.samples if sampled else basis
     lobes = lobes.reshape(len(lobes), 1, -1)
@@ -30,9 +31,9 @@ def lobe_products(
     def add(total, part):
         directions, weights, samples = part
         if not sampled:
-            samples = _matmul(samples, transfer.coefficients[:, :width].T)
+            samples = matmul(samples, transfer.coefficients[:, :width].T)
         values = samples * lobe(cosines(directions, axis), lobes)
-        return total + _matmul(weights, values), None
+        return total + matmul(weights, values), None
 
     total, _ = jax.lax.scan(add, jnp.zeros((len(lights), axis.shape[1]), axis.dtype), parts)
     return total
@@ -48,9 +49,5 @@ def cosines(directions: Float[Array, "n 3"], axis: Float[Array, "3 v"]) -> Float
 @cosines.defjvp
 def _cosines_jvp(primals, tangents):
     # The transpose of what is written out would sum over directions for each of three rows.
-    _, change = jax.jvp(_matmul, primals, tangents)
+    _, change = jax.jvp(matmul, primals, tangents)
     return cosines(*primals), change
-
-
-def _matmul(a, b):
-    return jnp.matmul(a, b, precision="highest")

@@ -4,7 +4,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import as_float, is_concrete
+from .._core.checks import as_float, is_concrete
 
 
 def _as_strong(value: ArrayLike) -> Float[Array, "..."]:

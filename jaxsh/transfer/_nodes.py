@@ -1,14 +1,13 @@
 """Directions at which products of three functions of one degree are sampled."""
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from ..harmonics._grid import exact_grid
+from .._core.host import read_only_cache
 from ..harmonics._indexing import orders
-from ..harmonics._tables import legendre
+from ..harmonics._tables import exact_grid, legendre
 
 # Algebraic degrees for which Lebedev's rules are known.
 _LEBEDEV = (*range(3, 33, 2), *range(35, 132, 6))
@@ -24,7 +23,7 @@ class Nodes(NamedTuple):
     project: Float[np.ndarray, "k n"]
 
 
-@functools.lru_cache(maxsize=16)
+@read_only_cache(maxsize=16)
 def product_nodes(degree: int) -> Nodes:
     """Exact for the integral of any three functions of this degree.
 
@@ -53,7 +52,7 @@ class NodePasses(NamedTuple):
     project: Float[np.ndarray, "p k n"]
 
 
-@functools.lru_cache(maxsize=16)
+@read_only_cache(maxsize=16)
 def node_passes(degree: int) -> NodePasses:
     """Those of `product_nodes`, some tens at a time."""
     nodes = product_nodes(degree)

@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..harmonics._indexing import check_degree
+from .._core.checks import check_degree
+from .._core.linalg import matmul
 from ._lobe import rows_of
 from ._nodes import node_passes
 from ._transfer import Transfer
@@ -47,7 +48,7 @@ def sample(transfer: Transfer, degree: int | None = None) -> SampledTransfer:
 def _sample(transfer, degree):
     coefficients = transfer.coefficients[:, : (degree + 1) ** 2]
     basis = jnp.asarray(node_passes(degree).basis, coefficients.dtype)
-    values = jnp.matmul(basis.reshape(-1, basis.shape[2]), coefficients.T, precision="highest")
+    values = matmul(basis.reshape(-1, basis.shape[2]), coefficients.T)
     samples = values.reshape(*basis.shape[:2], -1)
     positions, normals = rows_of(transfer.positions, transfer.normals)
     return SampledTransfer(samples, coefficients, positions, normals, degree)

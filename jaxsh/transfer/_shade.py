@@ -6,8 +6,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from ..harmonics._checks import align, as_float
-from ..harmonics._fence import fenced
+from .._core.checks import align, as_float
+from .._core.linalg import tall_product
+from .._core.xla import materialize
 from ._block_sums import block_sums
 from ._checks import checked_light
 from ._quantized import QuantizedTransfer
@@ -73,14 +74,5 @@ def irradiances(
         return tall_product(transfer.coefficients, filled)
     width = rows.shape[1]
     scaled = (rows * transfer.steps[None, :width])[None]
-    sums = fenced(block_sums, scaled, transfer.whole[:, :width])
+    sums = materialize(block_sums, scaled, transfer.whole[:, :width])
     return jnp.swapaxes(sums, 1, 2).reshape(-1, len(rows))[: transfer.count]
-
-
-def tall_product(tall: Float[Array, "v k"], rows: Float[Array, "n k"]) -> Float[Array, "v n"]:
-    """tall @ rowsᵀ, with rows of zeros up to eight.
-
-    XLA's CPU kernel is faster with eight than with three.
-    """
-    filled = jnp.pad(rows, ((0, max(0, 8 - len(rows))), (0, 0)))
-    return jnp.matmul(tall, filled.T, precision="highest")[:, : len(rows)]

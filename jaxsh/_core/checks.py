@@ -1,6 +1,7 @@
-"""Bad input met early: one sentence that says what was expected and what came."""
+"""Argument checks: one sentence that says what was expected and what came."""
 
 import math
+import operator
 
 import jax.numpy as jnp
 import numpy as np
@@ -45,3 +46,25 @@ def check_batches(**shapes: tuple[int, ...]) -> None:
 def flatten_batch(array: Float[Array, "*batch n"]) -> Float[Array, "rows n"]:
     """All leading axes as one, an empty one too, whose size `reshape` could not infer."""
     return array.reshape(math.prod(array.shape[:-1]), array.shape[-1])
+
+
+def check_degree(degree: int) -> int:
+    """The degree as a Python int, or a `ValueError` that says what was expected."""
+    try:
+        value = operator.index(degree)
+    except TypeError:
+        value = -1
+    if value < 0 or isinstance(degree, bool):
+        raise ValueError(f"degree must be an integer >= 0 known at trace time, got {degree!r}")
+    return value
+
+
+def check_size(name: str, value: int, least: int = 1) -> int:
+    """The size as a Python int; raises `ValueError` unless it is an integer >= `least`."""
+    try:
+        size = operator.index(value)
+    except TypeError:
+        size = least - 1
+    if size < least:
+        raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
+    return size

@@ -1,0 +1,61 @@
+"""Control over what XLA fuses and in what pieces it computes."""
+
+import math
+
+import jax
+import jax.numpy as jnp
+
+
+def on_mesh(*arguments) -> bool:
+    """True where an array lives on a mesh of several devices, and inside `shard_map`."""
+    leaves = (leaf for leaf in jax.tree.leaves(arguments) if isinstance(leaf, jax.Array))
+    return any(math.prod(jax.typeof(leaf).sharding.mesh.axis_sizes) > 1 for leaf in leaves)
+
+
+def materialize(function, *arguments):
+    """`function(*arguments)`, computed once and stored, where XLA would fuse it into each consumer.
+
+    Fused, it would be computed anew for every row of the consumer. On the CPU a conditional is a
+    boundary that XLA keeps, where it drops `lax.optimization_barrier`. The other branch is never
+    taken: `isnan(x) & (x > 0)` is always false, but XLA cannot prove it. On a mesh of devices the
+    function is called as it is, since a conditional would gather what is sharded.
+    """
+    function = jax.jit(function)  # traced once for all the uses below
+    if on_mesh(arguments):
+        return function(*arguments)
+
+    def conditional(*arguments):
+        value = jax.tree.leaves(arguments)[0].ravel()[:1]
+        never = jnp.any(jnp.isnan(value) & (value > 0))
+        shapes = jax.eval_shape(function, *arguments)
+
+        def zeros(*_):
+            return jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes)
+
+        return jax.lax.cond(never, zeros, function, *arguments)
+
+    return jax.lax.platform_dependent(*arguments, cpu=conditional, default=function)
+
+
+def in_blocks(function, *arrays, size: int):
+    """`function(*arrays)`, where rows of the leading axis do not depend on each other.
+
+    On one CPU it runs block by block of `size` rows, whose intermediate values stay in cache, and
+    on two or more devices or an accelerator in one call, since a loop would leave them idle. The
+    result is the same to rounding. Differentiable: each block is computed anew in reverse mode.
+    """
+    rows = arrays[0].shape[0]
+
+    def blocks(*arrays):
+        def cut(array):
+            padding = [(0, -rows % size)] + [(0, 0)] * (array.ndim - 1)
+            return jnp.pad(array, padding, mode="edge").reshape(-1, size, *array.shape[1:])
+
+        done = jax.lax.map(
+            jax.checkpoint(lambda block: function(*block)), tuple(cut(array) for array in arrays)
+        )
+        return jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[:rows], done)
+
+    if rows <= size or on_mesh(arrays):
+        return function(*arrays)
+    return jax.lax.platform_dependent(*arrays, cpu=blocks, default=function)
