@@ -11,6 +11,7 @@ import jaxtyping
 import numpy as np
 import pytest
 
+jax.config.update("jax_num_cpu_devices", 2)  # for the tests of sharding
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")

@@ -59,3 +59,28 @@ def in_blocks(function, *arrays, size: int):
     if rows <= size or on_mesh(arrays):
         return function(*arrays)
     return jax.lax.platform_dependent(*arrays, cpu=blocks, default=function)
+
+
+def keep_rows(function, *arguments, like, axis: int, out):
+    """`function(*arguments)`, with the rows of its results sharded as those of `like` are.
+
+    JAX refuses some operations on arrays with explicit axes, where it cannot tell how their
+    results are to be sharded. In here axes are automatic, so that XLA finds the way through.
+
+    - `like`: an array with one row for each row of the results, along its `axis`.
+    - `out`: for each result (a pytree prefix of them) the axis of its rows, or None where it has
+      none.
+    """
+    sharding = jax.typeof(like).sharding
+    spec = sharding.spec[axis] if axis < len(sharding.spec) else None
+    mesh = sharding.mesh
+    explicit = jax.sharding.AxisType.Explicit in mesh.axis_types
+    if spec is None or not explicit:
+        return function(*arguments)
+
+    def shard(axis):
+        entries = () if axis is None else (*[None] * axis, spec)
+        return jax.sharding.NamedSharding(mesh, jax.sharding.PartitionSpec(*entries))
+
+    out = jax.tree.map(shard, out, is_leaf=lambda axis: axis is None)
+    return jax.sharding.auto_axes(function, out_sharding=out)(*arguments)

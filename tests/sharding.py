@@ -1,0 +1,65 @@
+"""What every public function of arrays promises on a mesh of devices."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+from jax.sharding import AxisType, NamedSharding
+from jax.sharding import PartitionSpec as P
+
+ROWS = P("rows")  # for an array whose leading axis is shared out; P(None, "rows") for the second
+WHOLE = P()  # for one that each device holds in full
+
+
+def check_sharded(
+    function: Callable[..., Any], arguments: tuple, specs: tuple, out: Any, *, rtol: float = 1e-5
+) -> None:
+    """Runs `function` on two devices: the same numbers, sharded as `out` says, nothing gathered.
+
+    `specs` and `out` are prefix pytrees of PartitionSpecs, one for each argument and for the
+    result. Arguments that are not arrays (Python numbers, strings, None) belong into `function`.
+    It is tried with automatic axes, with explicit ones and inside `shard_map`.
+    """
+    plain = jax.jit(function)(*arguments)
+    for kind in (AxisType.Auto, AxisType.Explicit):
+        mesh = jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+        placed = tuple(
+            jax.device_put(argument, _shardings(mesh, spec, argument))
+            for argument, spec in zip(arguments, specs, strict=True)
+        )
+        compiled = jax.jit(function).lower(*placed).compile()
+        result = compiled(*placed)
+        _check_placed(result, _shardings(mesh, out, result), kind)
+        _check_close(result, plain, rtol, kind)
+        gathered = [line for line in compiled.as_text().splitlines() if " all-gather" in line]
+        assert not gathered, f"{kind} axes: {gathered[0].strip()}"
+        mapped = jax.shard_map(function, mesh=mesh, in_specs=specs, out_specs=out)
+        _check_close(jax.jit(mapped)(*placed), plain, rtol, f"shard_map, {kind}")
+
+
+def _shardings(mesh, spec, tree):
+    """The prefix `spec`, broadcast to the leaves of `tree`."""
+    is_spec = lambda node: isinstance(node, P)  # noqa: E731
+    return jax.tree.map(
+        lambda one, part: jax.tree.map(lambda _: NamedSharding(mesh, one), part),
+        spec,
+        tree,
+        is_leaf=is_spec,
+    )
+
+
+def _check_placed(result, wanted, kind) -> None:
+    for array, sharding in zip(jax.tree.leaves(result), jax.tree.leaves(wanted), strict=True):
+        assert array.sharding.is_equivalent_to(sharding, array.ndim), (
+            f"{kind} axes: expected {sharding.spec}, got {array.sharding}"
+        )
+
+
+def _check_close(result, plain, rtol, kind) -> None:
+    for array, expected in zip(jax.tree.leaves(result), jax.tree.leaves(plain), strict=True):
+        expected = np.asarray(expected)
+        scale = np.abs(expected).max(initial=0)
+        np.testing.assert_allclose(
+            np.asarray(array), expected, rtol=rtol, atol=rtol * scale, err_msg=str(kind)
+        )
