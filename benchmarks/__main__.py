@@ -13,9 +13,9 @@ from typing import Any, Literal
 import tyro
 from tqdm import tqdm
 
-from experiments import Column, Table
-from experiments._machine import describe
-from experiments._report import to_json, to_markdown, write
+from experiments.runner import Column, Table
+from experiments.runner.machine import describe
+from experiments.runner.report import to_json, to_markdown, write
 
 # glibc's settings with which a process keeps what it frees.
 KEEPING = {

@@ -1,4 +1,4 @@
-"""A small experiment, registered for the length of a test in a folder of its own."""
+"""Two small experiments, registered for the length of a test in a folder of their own."""
 
 import importlib
 import json
@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 import experiments
-import experiments._registry as registry
-from experiments.__main__ import main
+import experiments.runner.registry as registry
+from experiments.runner.cli import main
 
 CONFIG = """\
+name = "toy"
 description = "A sum of powers"
 reproduces = "Nobody 1900, table 1"
 
@@ -34,7 +35,7 @@ from typing import Literal
 import jax
 import jax.numpy as jnp
 
-from experiments import Column, Context, Table, UserError, experiment
+from experiments.runner import Column, Context, Table, UserError, experiment
 
 
 class Window(enum.Enum):
@@ -125,19 +126,21 @@ class Runner:
 def toys(tmp_path, monkeypatch, capsys):
     """The command line with two experiments, "toy" and "toy.second", beside the real ones."""
     folder = tmp_path / "toys"
-    (folder / "configs").mkdir(parents=True)
-    (folder / "toy.py").write_text(MODULE)
-    (folder / "configs" / "toy.toml").write_text(CONFIG)
+    (folder / "toy").mkdir(parents=True)
+    (folder / "toy" / "first.py").write_text(MODULE)
+    (folder / "toy" / "first.toml").write_text(CONFIG)
+    (folder / "toy" / "second.py").write_text("from .first import second as second")
     second = """\
         description = "A draw"
         reproduces = "Nobody 1900, table 2"
         [quick]
     """
-    (folder / "configs" / "toy.second.toml").write_text(textwrap.dedent(second))
+    (folder / "toy" / "second.toml").write_text(textwrap.dedent(second))
     monkeypatch.setattr(experiments, "__path__", [*experiments.__path__, str(folder)])
     monkeypatch.setattr(registry, "_registered", {})
     monkeypatch.delenv("JAXSH_DATA", raising=False)
     monkeypatch.chdir(tmp_path)  # where "results" is, were a run to start that should not
     importlib.invalidate_caches()
     yield Runner(folder, tmp_path / "results", capsys)
-    sys.modules.pop("experiments.toy", None)
+    for module in ("experiments.toy", "experiments.toy.first", "experiments.toy.second"):
+        sys.modules.pop(module, None)

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from experiments.__main__ import main
-from experiments._annen2004_irradiance import (
+from experiments.annen2004.irradiance import (
     interpolate_records,
     irradiance,
     make_records,
     record_places,
 )
-from experiments._annen2004_methods import exact_samples, expand
-from experiments._annen2004_orders import answer, on_front
-from experiments._annen2004_scenes import cut, rectangle, three_lights
+from experiments.annen2004.methods import exact_samples, expand
+from experiments.annen2004.orders import answer, on_front
+from experiments.annen2004.scenes import cut, rectangle, three_lights
+from experiments.runner.cli import main
 
 OPTIONS = {
     "figure7": "--degree 1 --directions 64 --resolutions 32 --size 40 --samples 1",

@@ -7,13 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from experiments import Context, Data
-from experiments.__main__ import main
-from experiments._annen2004_figure1_5 import Figure15
-from experiments._annen2004_figure4 import Figure4
-from experiments._annen2004_figure6 import Figure6, _unfolded
-from experiments._annen2004_pictures import Panel, draw_panels
-from experiments._annen2004_scenes import (
+from experiments.annen2004.figure1_5 import Figure15
+from experiments.annen2004.figure4 import Figure4
+from experiments.annen2004.figure6 import Figure6, _unfolded
+from experiments.annen2004.scenes import (
     cut,
     exact_expansion,
     load,
@@ -21,7 +18,10 @@ from experiments._annen2004_scenes import (
     rectangle,
     three_lights,
 )
-from experiments._annen2004_table1 import Table1
+from experiments.annen2004.table1 import Table1
+from experiments.runner import Context, Data
+from experiments.runner.cli import main
+from experiments.shared.plots import Panel, draw_panels
 from jaxsh import midrange
 
 SMALL = ["--degree", "2", "--resolution", "16"]

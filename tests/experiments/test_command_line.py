@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import experiments
-from experiments._registry import entries, load
+from experiments.runner.registry import entries, load
 
 ROOT = Path(experiments.__file__).parent.parent
 
@@ -47,12 +47,12 @@ def test_list_shows_every_experiment(toys):
 
 
 def test_every_experiment_is_registered_and_its_presets_fill():
-    from experiments._config import fill
+    from experiments.runner.config import fill
 
-    for name, entry in entries().items():
+    for entry in entries().values():
         assert set(entry.presets) >= {"quick", "paper"}
         for preset, values in entry.presets.items():
-            fill(load(name).config, values, where=preset)
+            fill(load(entry).config, values, where=preset)
 
 
 @pytest.mark.parametrize("words", [[], ["--help"], ["run", "--help"]])
@@ -117,7 +117,7 @@ def test_overrides_are_typed(toys):
 
 
 def test_the_others_run_when_one_fails(toys):
-    config = toys.folder / "configs" / "toy.toml"
+    config = toys.folder / "toy" / "first.toml"
     config.write_text(config.read_text().replace("degrees = [1, 2]", "degrees = [4]\nmood='angry'"))
     code, stdout, stderr = toys.run("toy", "toy.second")
     assert code == 1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments import Data, UserError
+from experiments.runner import Data, UserError
 
 TETRAHEDRON = """\
 ply

@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from experiments.__main__ import main
-from experiments.environment import direct_irradiance, irradiance
+from experiments.ramamoorthi2001.environment import direct_irradiance, irradiance
+from experiments.runner.cli import main
 from jaxsh import sphere
 
 

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from experiments import Context, Data
-from experiments.__main__ import main
-from experiments._first_light_reference import Pixels, Receivers, direct, one_bounce, turned
+from experiments.runner import Context, Data
+from experiments.runner.cli import main
+from experiments.sloan2002.reference import Pixels, Receivers, direct, one_bounce, turned
 from jaxsh.geometry import RayScene, make_mesh
 
 SMALL = {

@@ -6,10 +6,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from experiments.__main__ import main
-from experiments._habel2008_day import sun_at_hour
-from experiments._habel2008_figure4 import measures, windowed
-from experiments._habel2008_spheres import sun_at
+from experiments.habel2008.figure1_5 import sun_at_hour
+from experiments.habel2008.figure4 import measures, windowed
+from experiments.habel2008.spheres import sun_at
+from experiments.runner.cli import main
 from jaxsh import sky
 
 

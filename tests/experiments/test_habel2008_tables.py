@@ -8,13 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from experiments import Data, UserError
-from experiments.__main__ import main
-from experiments._habel2008_cost import SAMPLES, verdict
-from experiments._habel2008_figure3 import smallest
-from experiments._habel2008_numpy import projection
-from experiments._habel2008_solvers import condition
-from experiments._habel2008_suns import Suns, polynomials, project
+from experiments.habel2008.cost import SAMPLES, verdict
+from experiments.habel2008.figure3 import smallest
+from experiments.habel2008.numpy_twin import projection
+from experiments.habel2008.solvers import condition
+from experiments.habel2008.suns import Suns, polynomials, project
+from experiments.runner import Data, UserError
+from experiments.runner.cli import main
 from jaxsh import sky, sphere
 
 COARSE = ["--heights", "7", "--turbidities", "3", "--max-steps", "8"]
@@ -180,7 +180,7 @@ def test_numpy_projection_is_ours():
 
 def test_rows_hold_the_packages_own_measure_and_fit():
     """`fit_error` and `habel2008_fit` beside what the experiment does faster in NumPy."""
-    from experiments._habel2008_figure3 import Model, _errors, fitted
+    from experiments.habel2008.figure3 import Model, _errors, fitted
 
     with jax.enable_x64(True):
         nodes, suns = Suns.nodes(10, 8), Suns.even(5, 3)

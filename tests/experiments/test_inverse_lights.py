@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from experiments.__main__ import main
+from experiments.runner.cli import main
 
 
 @pytest.fixture

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from experiments import Context, Data
-from experiments.__main__ import main
-from experiments._annen2004_glossy import Glossy
-from experiments._annen2004_pictures import Panel
-from experiments._leekim2014_figure8 import Figure8
-from experiments._leekim2014_figure10 import Figure10
-from experiments._leekim2014_pictures import Canvas, Look, evened, level_colors, with_key
-from experiments._leekim2014_scenes import Row, Scene, Scenes
-from experiments._leekim2014_spin import Frame, Method, flicker, play, spun
+from experiments.annen2004.glossy import Glossy
+from experiments.leekim2014.figure8 import Figure8
+from experiments.leekim2014.figure10 import Figure10
+from experiments.leekim2014.pictures import Canvas, Look, evened, level_colors, with_key
+from experiments.leekim2014.scenes import Row, Scene, Scenes
+from experiments.leekim2014.spin import Frame, Method, flicker, play, spun
+from experiments.runner import Context, Data
+from experiments.runner.cli import main
+from experiments.shared.plots import Panel
 from jaxsh import geometry, harmonics
 from jaxsh.adaptive import AdaptiveResult
 
@@ -27,7 +27,7 @@ ROW = ["--rows", "studio", "knot", "3"]  # one level: of those that leave, all k
 
 @pytest.fixture
 def data(monkeypatch):
-    monkeypatch.setattr("experiments._leekim2014_scenes.SIZE", 64)
+    monkeypatch.setattr("experiments.leekim2014.scenes.SIZE", 64)
     monkeypatch.delenv("JAXSH_DATA", raising=False)
     monkeypatch.setattr(Data, "mesh", lambda self, name: KNOT)
 

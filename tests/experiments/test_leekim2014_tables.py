@@ -11,12 +11,9 @@ import numpy as np
 import pytest
 
 import experiments
-from experiments import Data
-from experiments.__main__ import main
-from experiments._context import Context
-from experiments._leekim2014_methods import product_flops, rival
-from experiments._leekim2014_moving import eyes
-from experiments._leekim2014_scenes import (
+from experiments.leekim2014.methods import product_flops, rival
+from experiments.leekim2014.moving import eyes
+from experiments.leekim2014.scenes import (
     PAPER,
     Quality,
     Row,
@@ -25,10 +22,13 @@ from experiments._leekim2014_scenes import (
     rows_or_default,
     vertex_psnr,
 )
-from experiments._leekim2014_table1_report import gains, verdict
-from experiments._leekim2014_table2 import PAPER as PAPER_BY_DEGREE
-from experiments._leekim2014_table2 import break_even
-from experiments._leekim2014_threshold import effects
+from experiments.leekim2014.table1_report import gains, verdict
+from experiments.leekim2014.table2 import PAPER as PAPER_BY_DEGREE
+from experiments.leekim2014.table2 import break_even
+from experiments.leekim2014.threshold import effects
+from experiments.runner import Data
+from experiments.runner.cli import main
+from experiments.runner.context import Context
 
 # All at degree 4 but table2, so that they share what is compiled.
 OPTIONS = {
@@ -138,7 +138,7 @@ class TestTable1:
 
     def test_the_paper_preset_has_the_papers_rows(self):
         [folder] = experiments.__path__
-        text = (Path(folder) / "configs" / "leekim2014.table1.toml").read_text()
+        text = (Path(folder) / "leekim2014" / "table1.toml").read_text()
         assert [Row(*row) for row in tomllib.loads(text)["paper"]["rows"]] == list(PAPER)
 
     def test_where_the_gain_holds(self):

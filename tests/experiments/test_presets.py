@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments import UserError
-from experiments._config import check, fill, to_toml
+from experiments.runner import UserError
+from experiments.runner.config import check, fill, to_toml
 
 Colour = Enum("Colour", ["RED", "GREEN"])
 
@@ -89,26 +89,33 @@ def test_configs_that_the_runner_could_not_serve():
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("reproduces =", "toy.toml: Invalid value"),
-        ("descripton = ''", "toy.toml: unknown key 'descripton'; did you mean 'description'?"),
-        ("description = 'x'", "toy.toml: 'reproduces' should be a line of text"),
-        ("description = 'x'\nreproduces = 3", "toy.toml: 'reproduces' should be a line of text"),
+        ("reproduces =", "toy/first.toml: Invalid value"),
+        (
+            "descripton = ''",
+            "first.toml: unknown key 'descripton'; did you mean 'description'?",
+        ),
+        ("description = 'x'", "first.toml: 'reproduces' should be a line of text"),
+        (
+            "description = 'x'\nreproduces = 3",
+            "first.toml: 'reproduces' should be a line of text",
+        ),
     ],
 )
 def test_toml_files_that_are_not_an_experiment(toys, text, sentence):
-    (toys.folder / "configs" / "toy.toml").write_text(text)
+    (toys.folder / "toy" / "first.toml").write_text(text)
     assert sentence in toys.refused("list")
 
 
 def test_unknown_key_in_a_preset_names_file_and_preset(toys):
-    path = toys.folder / "configs" / "toy.toml"
+    path = toys.folder / "toy" / "first.toml"
     path.write_text(path.read_text().replace("scale", "scael"))
     sentence = toys.refused("run", "toy", "--preset", "paper")
-    assert "toy.toml [paper]: unknown key 'scael'; did you mean 'scale'?" in sentence
+    assert "toy/first.toml [paper]: unknown key 'scael'; did you mean 'scale'?" in sentence
 
 
 def test_a_toml_file_without_its_function_is_a_bug(toys):
-    path = toys.folder / "configs" / "toy.third.toml"
+    path = toys.folder / "toy" / "third.toml"
     path.write_text("description = 'x'\nreproduces = 'y'\n[quick]")
+    path.with_suffix(".py").touch()
     with pytest.raises(LookupError, match=r"registers no experiment 'toy\.third'"):
         toys("run", "toy.third")

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from experiments import Column, Context, Data, Table
-from experiments._report import plain, to_csv, to_json, to_markdown, write
+from experiments.runner import Column, Context, Data, Table
+from experiments.runner.report import plain, to_csv, to_json, to_markdown, write
 
 
 def test_a_run_leaves_everything(toys):

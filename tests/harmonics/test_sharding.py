@@ -15,6 +15,4 @@ def test_values_and_gradient_keep_the_sharding_of_directions(rng, dtype):
     check_sharded(
         lambda d: harmonics.evaluate_with_gradient(d, 3), (directions,), (ROWS,), (ROWS, ROWS)
     )
-    check_sharded(
-        jax.grad(lambda d: harmonics.evaluate(d, 3).sum()), (directions,), (ROWS,), ROWS
-    )
+    check_sharded(jax.grad(lambda d: harmonics.evaluate(d, 3).sum()), (directions,), (ROWS,), ROWS)

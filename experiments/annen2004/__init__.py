@@ -1,0 +1,1 @@
+"""Spherical-harmonic gradients for mid-range illumination (Annen, Kautz, Durand, Seidel 2004)."""

@@ -1,0 +1,1 @@
+"""The Preetham sky in spherical harmonics (Habel et al. 2008)."""

@@ -1,0 +1,1 @@
+"""Light recovered from shading: sun and turbidity, near area lights, their colours."""

@@ -1,0 +1,1 @@
+"""Locally adaptive products of spherical harmonics (Lee and Kim 2014)."""

@@ -1,0 +1,82 @@
+"""Figure 9: the base, the full computation, the paper's filter, its regions, and what it misses."""
+
+import dataclasses
+
+from ..runner import Context, Table, experiment
+from ..shared.plots import Panel, draw_panels
+from .figure1 import (
+    BASE,
+    FILTER,
+    TILES,
+    WHOLE,
+    Shading,
+    columns,
+    describe,
+    measured,
+    shadings,
+    truncated,
+)
+from .pictures import Canvas, Look, evened
+from .scenes import Scene, Scenes, rows_or_default
+
+_PSNR, _GAIN = 43.87, 3.0  # of the paper's figure 9
+_BASE = f"base, degree {BASE}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Figure9(Look):
+    pass
+
+
+@experiment("leekim2014.figure9")
+def figure9(config: Figure9, context: Context) -> Table:
+    """Base, full, adaptive, regions by level, and amplified differences (figure 9)."""
+    rows = rows_or_default(context, config.rows)
+    scenes = Scenes(context, rows, config.directions)
+    for row in context.progress(rows, "scenes"):
+        scene = scenes.load(row)
+        full = scene.full()
+        base = Shading(_BASE, truncated(scene, BASE), {})
+        by = {one.method: one for one in (base, *shadings(scene, config))}
+        for shading in by.values():
+            line = measured(scene, shading, full)
+            if shading.method == FILTER:
+                line |= {"psnr_paper": _PSNR}
+            context.record(line)
+        name = f"{row.mesh}_{row.environment}.png"
+        caption = (
+            f"{row.mesh} under {row.environment}: the paper's (a) to (d), with the degree that "
+            "each vertex was computed to; below, tiles, and differences from full, "
+            f"× {config.gain:g}"
+        )
+        _draw(config, context.path(name, caption), scene, full, by)
+    note = (
+        f"{describe(config)}The paper's {_PSNR} dB come with a gain of {_GAIN:g}: times are in "
+        "`leekim2014.table1`."
+    )
+    return Table("Base, full and adaptive", columns(), note=note)
+
+
+def _draw(config: Figure9, path, scene: Scene, full, by: dict[str, Shading]) -> None:
+    canvas = Canvas.of(scene, config.size, config.samples)
+    base, ours, whole, tiles = (by[name] for name in (_BASE, FILTER, WHOLE, TILES))
+    target = scene.row.degree
+    specular, diffuse = (
+        canvas.levels(ours.reached[kind], BASE, target) for kind in ("specular", "diffuse")
+    )
+    above = [
+        Panel(canvas.shown(base.color), f"(a) base, degree {BASE}"),
+        Panel(canvas.shown(full), f"(b) full, degree {target}"),
+        Panel(canvas.shown(ours.color), "(c) the filter"),
+        Panel(specular, "(d) specular, degrees"),
+        Panel(diffuse, "diffuse, degrees"),
+    ]
+    below = [
+        Panel(
+            canvas.difference(one.color, full, config.gain),
+            f"{name} - full × {config.gain:g}, {scene.quality(one.color, full).image:.1f} dB",
+        )
+        for name, one in (("base", base), ("filter", ours), ("smoothed", whole), ("tiles", tiles))
+    ]
+    first = Panel(canvas.shown(tiles.color), "tiles")
+    draw_panels(path, evened([above, [first, *below]]))

@@ -1,0 +1,202 @@
+"""The ways to shade a frame that the experiments on Lee & Kim 2014 time against each other."""
+
+import functools
+import itertools
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Literal, get_args
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxsh import adaptive, transfer
+from jaxsh.adaptive._products import lobe_kernel
+from jaxsh.harmonics import product_matrix
+from jaxsh.transfer._layout import in_tiles, out_of_tiles, rows_in_tiles
+from jaxsh.transfer._lobe import reflected
+
+from ..runner import Context
+from .scenes import Quality, Scene
+
+Method = Literal["masks", "levels", "two_stage", "probes", "tiles"]
+METHODS: tuple[Method, ...] = get_args(Method)
+FILTERS = "masks", "levels", "two_stage"
+THRESHOLD, DIFFUSE_THRESHOLD = 0.02, 0.01  # the paper's
+STILL = "eye product"
+DIFFUSE, EIGHT_BITS = "diffuse", "diffuse, eight bits"
+_BURST = 3  # frames of one way, before the next takes its turn
+TURN = 0.05  # of the light from frame to frame, in radians
+
+Light = Float[Array, "3 k"]
+Way = Callable[[Light], Any]
+
+WHAT = (
+    "einsum: equation 5 as an einsum of three operands. Product form: R = [α L̂; L] O, tile by tile "
+    "of 1,024 vertices, as one matrix product. Full: `transfer.shade_glossy` of sampled transfer, "
+    "the same result as a sum over exact nodes, without L̂. "
+)
+HOW = (
+    f"Float32 on the CPU; medians of frames, all ways taking turns of {_BURST} frames in one run, "
+    "the light turning in every frame; compiling and what is made once per mesh (samples, probes, "
+    "tiles) are not included. two_stage, probes and tiles keep the transfer in eight bits. "
+)
+
+
+def baselines(scene: Scene) -> dict[str, Way]:
+    """The full computation in three forms, slowest first."""
+    sampled = transfer.sample(scene.baked)
+    rest = scene.baked, scene.eye, scene.material
+    return {
+        "einsum": lambda light: _einsum(light, *rest),
+        "product form": lambda light: _product_form(light, *rest),
+        "full": lambda light: transfer.shade_glossy(light, sampled, *rest[1:]),
+    }
+
+
+def still(scene: Scene) -> dict[str, Way]:
+    """The full computation for an eye that stands still, with all done before that can be."""
+    return {STILL: transfer.eye_product(scene.baked, scene.eye, scene.material)}
+
+
+def diffuse(scene: Scene) -> dict[str, Way]:
+    """The diffuse part alone, in float32 and in eight bits."""
+
+    def way(baked: transfer.Transfer | transfer.QuantizedTransfer) -> Way:
+        return lambda light: transfer.shade_diffuse(light, baked, scene.material.diffuse)
+
+    return {DIFFUSE: way(scene.baked), EIGHT_BITS: way(transfer.quantize(scene.baked))}
+
+
+def adaptive_way(scene: Scene, method: Method, **options: Any) -> Way:
+    """A frame by one of the methods, with what it needs made; gives an `AdaptiveResult`."""
+    baked: transfer.Transfer | transfer.QuantizedTransfer | adaptive.StagedTransfer = scene.baked
+    if method in FILTERS:
+        options = {
+            "threshold": THRESHOLD,
+            "diffuse_threshold": DIFFUSE_THRESHOLD,
+            # At degree 2 the paper's base leaves nothing to add.
+            "base": min(2, scene.row.degree - 1),
+        } | options
+    if method == "two_stage":
+        baked = adaptive.stage(scene.baked, scene.row.degree, base=options["base"])
+    elif method == "probes":
+        baked = transfer.quantize(scene.baked)
+        options = {"probes": adaptive.make_probes(scene.baked)} | options
+    elif method == "tiles":
+        baked = transfer.quantize(scene.baked)
+        exponent = float(scene.material.exponent)
+        made = adaptive.make_tiles(scene.baked, scene.eye, exponent=exponent)
+        options = {"tiles": made} | options
+    return lambda light: adaptive.shade(
+        light, baked, scene.eye, scene.material, method=method, **options
+    )
+
+
+def truncations(scene: Scene) -> dict[str, Way]:
+    """The trivial rival: everyone stops at a lower degree."""
+
+    def way(degree: int) -> Way:
+        lower = scene.cut(degree)
+        sampled, count = transfer.sample(lower.baked), lower.light.shape[1]
+        return lambda light: transfer.shade_glossy(
+            light[:, :count], sampled, scene.eye, scene.material
+        )
+
+    target = scene.row.degree
+    return {f"degree {degree}": way(degree) for degree in range(max(2, target - 6), target)}
+
+
+def warm(context: Context, label: str, ways: Mapping[str, Way], light: Light) -> dict[str, Any]:
+    """The first frame of each way, which compiles: what it gives."""
+    with context.time(f"{label}: first frames, which compile"):
+        return {name: jax.block_until_ready(way(light)) for name, way in ways.items()}
+
+
+def seconds(ways: Mapping[str, Way], lights: Iterable[Light]) -> dict[str, float]:
+    """The median frame of each way; they take turns of a few frames, as an animation has them."""
+    taken: dict[str, list[float]] = {name: [] for name in ways}
+    for burst in _bursts(lights):
+        jax.block_until_ready(burst)
+        for name, way in ways.items():
+            for light in burst:
+                start = time.perf_counter()
+                jax.block_until_ready(way(light))
+                taken[name].append(time.perf_counter() - start)
+    return {name: statistics.median(times) for name, times in taken.items()}
+
+
+def _bursts(lights: Iterable[Light]) -> Iterator[list[Light]]:
+    lights = iter(lights)
+    while burst := list(itertools.islice(lights, _BURST)):
+        yield burst
+
+
+def lights(scene: Scene, frames: int) -> list[Light]:
+    """The scene's light, turning; its own direction is left to the errors."""
+    return [scene.turned(TURN * (frame + 1)) for frame in range(frames)]
+
+
+def color(result: Any) -> Float[Array, "v 3"]:
+    return result.color if isinstance(result, adaptive.AdaptiveResult) else result
+
+
+def rival(spent: float, times: Mapping[str, float], qualities: Mapping[str, Quality]):
+    """The highest truncation that takes no longer than `spent`: its name and object PSNR.
+
+    Where even the lowest takes longer it is the lowest; "full" where the full computation does not.
+    """
+    if times["full"] <= spent:
+        return {"rival": "full", "rival_psnr_object": math.inf}
+    names = list(qualities)
+    name = next((n for n in reversed(names) if times[n] <= spent), names[0])
+    return {"rival": name, "rival_psnr_object": qualities[name].object}
+
+
+@jax.jit
+def _einsum(light, baked, eye, material):
+    kernel = _kernel(baked, eye, material, light.shape[-1])
+    glossy = jnp.einsum(
+        "iv,cij,vj->vc", kernel, product_matrix(light), baked.coefficients, precision="highest"
+    )
+    return material.specular * glossy + transfer.shade_diffuse(light, baked, material.diffuse)
+
+
+def _kernel(baked, eye, material, width: int) -> Float[Array, "k v"]:
+    axis = reflected(eye, baked.positions, baked.normals, False)
+    return lobe_kernel(axis, material.exponent, math.isqrt(width) - 1, True)
+
+
+@jax.jit
+def _product_form(light, baked, eye, material):
+    width = light.shape[-1]
+    rows = jnp.concatenate([product_matrix(light).reshape(-1, width), light])
+    axis = reflected(eye, baked.positions, baked.normals, False)
+
+    def tile(part):
+        coefficients, axis = part
+        kernel = lobe_kernel(axis, material.exponent, math.isqrt(width) - 1, True)
+        products = jnp.matmul(rows, coefficients.T, precision="highest")
+        channels = products[:-3].reshape(3, width, -1)
+        glossy = jnp.stack([jnp.sum(kernel * channel, axis=0) for channel in channels])
+        return material.specular * glossy + material.diffuse / math.pi * products[-3:]
+
+    tiles = jax.lax.map(tile, (rows_in_tiles(baked.coefficients), in_tiles(axis)))
+    return out_of_tiles(tiles, len(baked.positions)).T
+
+
+def product_flops(vertices: int, coefficients: int) -> int:
+    """Of the product form: a multiplication and an addition for each of 3 K² and 3 K terms."""
+    return 2 * vertices * 3 * coefficients * (coefficients + 1)
+
+
+def matmul(size: int = 1024) -> tuple[Way, int]:
+    """A square product in float32, which tells the machine's rate, and its operations."""
+    left, right = jnp.asarray(
+        np.random.default_rng(0).normal(size=(2, size, size)), dtype=jnp.float32
+    )
+    multiply = jax.jit(functools.partial(jnp.matmul, precision="highest"))
+    return lambda _: multiply(left, right), 2 * size**3

@@ -1,0 +1,158 @@
+"""The paper's choices: threshold, refinement of the regions, smoothing of their edges."""
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any, Literal
+
+import numpy as np
+
+from ..runner import Column, Context, Table, experiment
+from .methods import (
+    HOW,
+    THRESHOLD,
+    WHAT,
+    adaptive_way,
+    baselines,
+    color,
+    lights,
+    seconds,
+    warm,
+)
+from .plots import draw_thresholds
+from .scenes import Row, Scene, Scenes, rows_or_default
+
+Filter = Literal["levels", "two_stage"]
+Variant = Literal["outside at the base", "4 rings", "refined", "smoothed", "refined, smoothed"]
+_EVERYONE = 1 << 20  # rings: more than there are
+_PLAIN = "as it is"
+_VARIANTS: dict[Variant, dict[str, Any]] = {
+    "outside at the base": {"outside": "base"},
+    "4 rings": {"rings": 4},
+    "refined": {"rings": _EVERYONE},
+    "smoothed": {"smoothing": True},
+    "refined, smoothed": {"rings": _EVERYONE, "smoothing": True},
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Threshold:
+    environment: str | None = None
+    """none means the first of the data"""
+    mesh: str | None = None
+    """none means the first of the data"""
+    degree: int = 4
+    methods: tuple[Filter, ...] = ("levels", "two_stage")
+    variants: tuple[Variant, ...] = tuple(_VARIANTS)
+    """beside each method as it is"""
+    thresholds: tuple[float, ...] = (0.005, 0.02, 0.08)
+    """of specular change; that of diffuse change is half of it, as in the paper"""
+    frames: int = 3
+    """frames of each, in turns"""
+    directions: int = 2048
+    """directions of the bake"""
+
+    def __post_init__(self):
+        if self.degree < 3 or min(self.frames, self.directions) < 1:
+            raise ValueError("degree must be at least 3, frames and directions at least 1")
+        if not self.thresholds or min(self.thresholds) <= 0 or not self.methods:
+            raise ValueError("methods must be one or more, and thresholds too, above 0")
+
+
+@experiment("leekim2014.threshold")
+def threshold(config: Threshold, context: Context) -> list[Table]:
+    [first] = rows_or_default(context, (), config.degree)
+    row = Row(config.environment or first.environment, config.mesh or first.mesh, config.degree)
+    scene = Scenes(context, [row], config.directions).load(row)
+    for line in _rows(config, context, scene):
+        context.record(line)
+    caption = "error, share of vertices and gain by threshold; the paper's is marked"
+    draw_thresholds(context.path("threshold.png", caption), context.rows)
+    return list(_tables(config, context.rows, row))
+
+
+def _rows(config: Threshold, context: Context, scene: Scene) -> Iterator[dict[str, Any]]:
+    full = baselines(scene)
+    turning = lights(scene, config.frames)
+    for method in config.methods:
+        for variant in context.progress((_PLAIN, *config.variants), method):
+            options = {} if variant == _PLAIN else _VARIANTS[variant]
+            ways = {
+                f"{limit}": adaptive_way(
+                    scene, method, threshold=limit, diffuse_threshold=limit / 2, **options
+                )
+                for limit in config.thresholds
+            }
+            first = warm(context, f"{method}, {variant}", full | ways, scene.light)
+            times = seconds(full | ways, turning)
+            for limit in config.thresholds:
+                result, spent = first[f"{limit}"], times[f"{limit}"]
+                quality = scene.quality(color(result), first["full"])
+                yield {
+                    "method": method,
+                    "variant": variant,
+                    "threshold": limit,
+                    "kept": float(np.ravel(np.asarray(result.kept["specular"]))[-1]),
+                    "spent": float(result.spent),
+                    "gain": times["full"] / spent,
+                    "gain_product": times["product form"] / spent,
+                    "gain_einsum": times["einsum"] / spent,
+                } | quality.named()
+
+
+def _tables(config: Threshold, rows: list[dict[str, Any]], row: Row) -> Iterator[Table]:
+    yield Table(
+        "Variants by threshold",
+        [
+            Column("method", "method"),
+            Column("variant", "variant"),
+            Column("threshold", "threshold"),
+            Column("kept", "share kept", digits=3),
+            Column("spent", "multiply-adds / full's", digits=3),
+            Column("psnr_image", "PSNR, dB: image", digits=1),
+            Column("psnr_object", "object", digits=1),
+            Column("psnr_vertex", "vertices", digits=1),
+            Column("gain", "gain against full", digits=2),
+            Column("gain_product", "against product form", digits=2),
+            Column("gain_einsum", "against einsum", digits=2),
+        ],
+        rows,
+        f"{row.mesh} under {row.environment} at degree {row.degree}. Kept: after the last level, "
+        "before refinement, of specular light (two_stage: of either). Refined: breadth-first until "
+        "nothing joins. Smoothed: over two rings, as in the paper's figure 7. Multiply-adds are of "
+        f"the products of coefficients alone. {WHAT}{HOW}",
+    )
+    limit = min(config.thresholds, key=lambda one: abs(one - THRESHOLD))
+    choices = list(effects(rows, limit))
+    if choices:
+        yield Table(
+            "What each choice does",
+            [
+                Column("method", "method"),
+                Column("variant", "choice"),
+                Column("psnr", "object PSNR, dB: change", digits=2),
+                Column("time", "time: factor", digits=2),
+                Column("judgement", "so it"),
+            ],
+            choices,
+            f"At the threshold {limit:g}, against the method as it is: vertices outside show the "
+            "level at which they left, no refinement, no smoothing. Less than 0.1 dB is little.",
+        )
+
+
+def effects(rows: list[dict[str, Any]], limit: float) -> Iterator[dict[str, Any]]:
+    """Each variant against the plain method at one threshold."""
+    at = [row for row in rows if row["threshold"] == limit]
+    plain = {row["method"]: row for row in at if row["variant"] == _PLAIN}
+    for row in at:
+        if row["variant"] == _PLAIN:
+            continue
+        basis = plain[row["method"]]
+        psnr = row["psnr_object"] - basis["psnr_object"]
+        judgement = "helps" if psnr > 0.1 else "hurts" if psnr < -0.1 else "changes little"
+        yield {
+            "method": row["method"],
+            "variant": row["variant"],
+            "psnr": psnr,
+            "time": basis["gain"] / row["gain"],
+            "judgement": judgement,
+        }

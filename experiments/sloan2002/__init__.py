@@ -1,0 +1,1 @@
+"""Precomputed radiance transfer with shadows and a bounce, after Sloan et al. 2002."""
