@@ -1,11 +1,11 @@
 """Spherical-harmonic lighting in JAX.
 
-Each room below is a module that loads when it is first used, so that ``import jaxsh`` costs
-little beyond ``import jax``::
+Each module below loads when it is first used, so that ``import jaxsh`` costs little beyond
+``import jax``:
 
-    import jaxsh
-
-    basis = jaxsh.harmonics.evaluate(directions, degree=4)
+>>> import jaxsh
+>>> jaxsh.harmonics.evaluate([[0.0, 0.0, 1.0]], degree=1).shape
+(1, 4)
 """
 
 import importlib as _importlib
@@ -18,6 +18,7 @@ if _TYPE_CHECKING:
     from . import imaging as imaging
     from . import inverse as inverse
     from . import midrange as midrange
+    from . import plot as plot
     from . import sky as sky
     from . import sphere as sphere
     from . import transfer as transfer
@@ -29,6 +30,7 @@ __all__ = [
     "imaging",
     "inverse",
     "midrange",
+    "plot",
     "sky",
     "sphere",
     "transfer",

@@ -4,6 +4,7 @@ import os
 
 # Before JAX starts: tests run in parallel processes, so each keeps to its own thread pool.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
+os.environ.setdefault("MPLBACKEND", "agg")  # no window on any machine
 
 import hypothesis
 import jax

@@ -39,18 +39,24 @@ def test_import_is_light():
     assert [name for name in runs[0]["added"] if name.startswith("jaxsh")] == ["jaxsh"]
 
 
-def test_the_lower_rooms_load_without_readers_and_solvers():
+def test_the_lower_modules_load_without_readers_and_solvers():
     added = measure("import jaxsh; jaxsh.sphere.lat_long; jaxsh.harmonics.evaluate")["added"]
     assert {"jaxsh.harmonics", "jaxsh.sphere"} <= set(added)
     assert not {"jaxsh.geometry", "jaxsh.imaging"} & set(added)
     assert not top_level(added) & (HEAVY - {"equinox"})
 
 
-def test_rooms_are_listed_and_others_refused():
+def test_plots_choose_no_backend_and_load_no_window():
+    added = measure("import jaxsh.plot, matplotlib")["added"]
+    assert {"jaxsh.imaging", "jaxsh.sphere"} <= set(added)
+    assert "matplotlib.pyplot" not in added
+
+
+def test_modules_are_listed_and_others_refused():
     import jaxsh
 
     assert set(jaxsh.__all__) < set(dir(jaxsh))
-    for room in jaxsh.__all__:
-        assert getattr(jaxsh, room).__name__ == f"jaxsh.{room}"
+    for module in jaxsh.__all__:
+        assert getattr(jaxsh, module).__name__ == f"jaxsh.{module}"
     with pytest.raises(AttributeError, match=r"no attribute 'kitchen'; it has .*'harmonics'"):
         _ = jaxsh.kitchen

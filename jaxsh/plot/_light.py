@@ -1,0 +1,111 @@
+"""A light as a lat-long picture."""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, Float
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+
+from ..imaging import auto_exposure, tone_map
+from ..sphere import reconstruct_lat_long
+from ._arrays import read, read_coefficients
+
+_MARK = "#ff00ff"
+_ROUNDING = 1e-6  # of the largest radiance: negative light below this is rounding
+
+
+def light(
+    light: Float[ArrayLike, "..."],
+    *,
+    height: int = 128,
+    exposure: float | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw a light as a lat-long picture, tone-mapped, with negative radiance marked.
+
+    Coefficients that were cut off at a degree ring: beside a bright source the radiance falls below
+    zero, which no physical light does and which a tone curve would show as plain black. Directions
+    where a channel is negative are hatched and outlined in magenta, and the legend says what share
+    of the sphere's solid angle they take and how low the radiance falls.
+
+    **Arguments**
+
+    - `light`: coefficients (K,), (1, K) or (3, K), or a lat-long picture (height, width, 1 or 3),
+      linear radiance, as `sphere.project_lat_long` takes it: row 0 touches +z, column 0 starts at
+      +x. jax or numpy.
+    - `height`: rows of the picture that coefficients are drawn as; it has twice as many columns.
+    - `exposure`: factor before the tone curve; by default the one that takes the 99th percentile
+      of the pixels to white.
+    - `ax`: axes to draw on; by default those of a new figure.
+
+    **Returns**
+
+    The axes, in degrees: φ from 0 to 360 to the right, θ from 0 to 180 downwards. Raises
+    `ValueError` for any other shape and for values that are not finite.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import plot
+    >>> ax = plot.light(np.array([1.0, 0.0, 3.0, 0.0]))  # bright above, negative below
+    >>> ax.get_legend().get_texts()[0].get_text()
+    'negative: 40 % of the sphere, down to −1.2'
+    """
+    picture = _picture(light, height)
+    shown = jnp.asarray(picture)
+    if exposure is None:
+        exposure = float(auto_exposure(shown))
+    encoded = np.asarray(tone_map(shown, exposure))
+    if ax is None:
+        from matplotlib import pyplot
+
+        _, ax = pyplot.subplots(figsize=(7, 4), layout="constrained")
+    ax.imshow(
+        np.broadcast_to(encoded, (*encoded.shape[:2], 3)),
+        extent=(0, 360, 180, 0),
+        aspect="equal",
+        interpolation="nearest",
+    )
+    _mark_negative(ax, picture)
+    ax.set_xticks([0, 90, 180, 270, 360], ["0°\n+x", "90°\n+y", "180°\n−x", "270°\n−y", "360°\n+x"])
+    ax.set_yticks([0, 90, 180], ["0° +z", "90°", "180° −z"])
+    ax.set_xlabel("φ")
+    ax.set_ylabel("θ")
+    return ax
+
+
+def _picture(light: ArrayLike, height: int) -> Float[np.ndarray, "h w c"]:
+    values = read("light", light)
+    if values.ndim == 3 and values.shape[-1] in (1, 3) and values.size:
+        return values
+    if values.ndim == 1 or (values.ndim == 2 and values.shape[0] in (1, 3)):
+        coefficients = np.atleast_2d(read_coefficients(values))
+        return np.asarray(reconstruct_lat_long(jnp.asarray(coefficients), height, 2 * height))
+    raise ValueError(
+        "expected coefficients (K,), (1, K) or (3, K), or a lat-long picture (height, width, "
+        f"1 or 3), got shape {values.shape}"
+    )
+
+
+def _mark_negative(ax: Axes, picture: Float[np.ndarray, "h w c"]) -> None:
+    lowest = picture.min(axis=-1)
+    if not lowest.min() < -_ROUNDING * abs(picture).max():
+        return
+    rows, columns = lowest.shape
+    phi = (np.arange(-1, columns + 1) + 0.5) * 360 / columns
+    theta = np.concatenate([[0], (np.arange(rows) + 0.5) * 180 / rows, [180]])
+    # One pixel more on each side, so that the outline reaches the picture's edges.
+    around = np.pad(np.pad(lowest, ((1, 1), (0, 0)), mode="edge"), ((0, 0), (1, 1)), mode="wrap")
+    hatched = ax.contourf(
+        phi, theta, around, levels=[float(lowest.min()) * 1.01, 0.0], colors="none", hatches=["///"]
+    )
+    hatched.set(edgecolor=_MARK, linewidth=0.0)
+    ax.contour(phi, theta, around, levels=[0.0], colors=_MARK, linewidths=1.2)
+    ax.set(xlim=(0, 360), ylim=(180, 0))
+    bounds = np.cos(np.linspace(0, np.pi, rows + 1))
+    share = ((lowest < 0).mean(axis=1) * (bounds[:-1] - bounds[1:])).sum() / 2
+    text = f"negative: {100 * share:.2g} % of the sphere, down to −{-lowest.min():.2g}"
+    patch = Patch(facecolor="none", edgecolor=_MARK, hatch="///", label=text)
+    ax.legend(
+        handles=[patch], loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, fontsize=9
+    )
