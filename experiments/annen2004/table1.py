@@ -112,7 +112,7 @@ def table1(config: Table1, context: Context) -> list[Table]:
     for name in config.meshes or context.data.meshes()[:1]:
         subject = load(context, name, config.degree, directions=config.directions)
         camera = imaging.Camera.facing(subject.mesh, width=_SIZE, height=_SIZE)
-        frame = Frame(config, subject, camera, geometry.RayScene(subject.mesh), 1.0)
+        frame = Frame(config, subject, camera, geometry.ray_scene(subject.mesh), 1.0)
         moving = [_turned(config, _TURN * step) for step in range(config.frames + 1)]
         for way in (*_WAYS, _EXACT):
             with context.time(f"{name}: first frame {way}, which compiles"):

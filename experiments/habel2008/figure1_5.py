@@ -160,7 +160,7 @@ def _scene(config: Figure15, context: Context) -> Scene:
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-9)
     return Scene(
         mesh,
-        geometry.RayScene(mesh),
+        geometry.ray_scene(mesh),
         baked,
         jnp.asarray(albedo, jnp.float32),
         camera,

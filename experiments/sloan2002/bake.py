@@ -84,7 +84,7 @@ def bake(
 ) -> Subject:
     """Bake the three variants, and record what they took and the error of the transfer itself."""
     mesh = context.data.mesh(name)
-    scene = geometry.RayScene(mesh)
+    scene = geometry.ray_scene(mesh)
     baked = functools.partial(
         transfer.bake,
         mesh,

@@ -86,7 +86,7 @@ def irradiance(
 
     Environments of one size share their rays.
     """
-    scene, receivers = geometry.RayScene(mesh), Receivers.of(mesh, chosen, offset)
+    scene, receivers = geometry.ray_scene(mesh), Receivers.of(mesh, chosen, offset)
     sizes: dict[tuple[int, ...], list[str]] = {}
     for name, environment in environments.items():
         sizes.setdefault(environment.shape, []).append(name)

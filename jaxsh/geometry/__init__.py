@@ -6,6 +6,7 @@ back. Space is right-handed with z up.
 """
 
 from ._cast import JaxRayScene
+from ._embree import EmbreeRayScene, ray_scene
 from ._knot import knot
 from ._mesh import Mesh, make_mesh, vertex_normals
 from ._neighbors import neighbors
@@ -16,6 +17,7 @@ from ._trace import Trace, trace
 from ._tree import RayTree
 
 __all__ = [
+    "EmbreeRayScene",
     "Hit",
     "JaxRayScene",
     "Mesh",
@@ -26,6 +28,7 @@ __all__ = [
     "knot",
     "make_mesh",
     "neighbors",
+    "ray_scene",
     "read_mesh",
     "topology",
     "trace",

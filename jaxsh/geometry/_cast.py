@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ._mesh import Mesh
-from ._rays import Hit, Vectors, _limits, _paired, _prepared
+from ._rays import Hit, Vectors, limits_of, paired, prepared
 from ._trace import Trace, trace
 from ._tree import RayTree, ray_tree
 
@@ -21,7 +21,7 @@ _CHUNK = 32
 
 
 class JaxRayScene:
-    """`RayScene` without Embree: the same questions and answers, on any device that JAX has.
+    """Casts rays by JAX, on any device that it has: `EmbreeRayScene` without Embree.
 
     Takes one `Mesh` or a sequence of them; a later change of a mesh is not seen. Faces stop rays
     from both sides. Watertight at edges and vertices. Positions, directions and distances are
@@ -52,8 +52,8 @@ class JaxRayScene:
 
         Arguments and errors as for `RayScene.occluded`.
         """
-        origins, directions = _paired(origins, directions)
-        limits = _limits(max_distance, len(origins))
+        origins, directions = paired(origins, directions)
+        limits = limits_of(max_distance, len(origins))
         result = np.empty(len(origins), bool)
         for part, (_, triangle, _) in self._each_chunk(origins, directions, limits, first=False):
             result[part] = triangle >= 0
@@ -61,7 +61,7 @@ class JaxRayScene:
 
     def closest_hit(self, origins: Vectors, directions: Vectors) -> Hit:
         """The first surface that each ray meets. Arguments and errors as for `occluded`."""
-        origins, directions = _paired(origins, directions)
+        origins, directions = paired(origins, directions)
         count = len(origins)
         limits = np.broadcast_to(np.float32(np.inf), count)
         triangle = np.empty(count, np.int32)
@@ -82,7 +82,7 @@ class JaxRayScene:
         for start in range(0, len(origins), size):
             part = slice(start, min(start + size, len(origins)))
             count = part.stop - start
-            rays = *_prepared(origins, directions, part), limits[part]
+            rays = *prepared(origins, directions, part), limits[part]
             for array, values in zip(padded, rays, strict=True):
                 array[:count] = values
             found = _trace(

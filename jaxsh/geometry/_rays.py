@@ -1,23 +1,13 @@
-"""Ray casting: Embree, in chunks, on every core."""
+"""Which rays a scene of meshes stops: the questions, the answers, and the checks of both."""
 
-import functools
 import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from .._core.host import cores
-from ._mesh import Mesh
-
 # One vector for each ray, or one for all of them.
 Vectors = Float[Array | np.ndarray, "n 3"] | Float[Array | np.ndarray, " 3"]
-
-# Rays in a chunk: few enough to share a call's rays between the cores, many enough that the cost
-# of a chunk is that of its rays.
-_CHUNK = (4_096, 65_536)
 
 
 class Hit(NamedTuple):
@@ -32,43 +22,14 @@ class Hit(NamedTuple):
     barycentric: Float[np.ndarray, "n 3"]  # weights of the face's vertices 0, 1, 2; float32
 
 
-class RayScene:
-    """Meshes in an Embree scene, to be asked which rays they stop.
+@runtime_checkable
+class RayScene(Protocol):
+    """Answers which rays are stopped, as `ray_scene` does: anything with these two methods.
 
-    Takes one `Mesh` or a sequence of them; a later change of a mesh is not seen. Faces stop rays
-    from both sides. In Embree's robust mode, which still lets a very few rays slip through exactly
-    at an edge or a vertex (`JaxRayScene` lets none). Positions, directions and distances are
-    float32 within.
-
-    A ray that starts on a surface may hit it: start it a little off, along the normal.
-    Answers do not depend on the number of threads or on how rays are cut into chunks.
+    `EmbreeRayScene` and `JaxRayScene` are such scenes; one of your own may wrap another (to count
+    its rays, say) or know its surfaces in closed form. `transfer.bake`, `imaging.rasterize` and
+    `midrange.capture` take any.
     """
-
-    def __init__(self, meshes: Mesh | Sequence[Mesh]):
-        try:
-            from embreex.mesh_construction import TriangleMesh
-            from embreex.rtcore_scene import EmbreeScene
-        except ImportError as error:
-            raise ImportError(
-                "RayScene needs embreex, which cannot be imported here: JaxRayScene answers the "
-                "same questions without it"
-            ) from error
-
-        meshes = [meshes] if isinstance(meshes, Mesh) else list(meshes)
-        if not meshes:
-            raise ValueError("RayScene needs at least one mesh, got an empty sequence")
-        self._scene: Any = EmbreeScene(robust=True)
-        for mesh in meshes:
-            vertices = np.ascontiguousarray(mesh.vertices, np.float32)
-            TriangleMesh(self._scene, vertices, np.ascontiguousarray(mesh.faces, np.int32))
-        # Embree builds its tree at the first query, and that must not happen on two threads.
-        self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
-        self._threads = cores()
-
-    @functools.cached_property
-    def _pool(self) -> ThreadPoolExecutor:
-        """Started by the first query of many rays: few need no threads."""
-        return ThreadPoolExecutor(self._threads)
 
     def occluded(
         self,
@@ -83,52 +44,14 @@ class RayScene:
 
         Raises `ValueError` for wrong shapes, NaN or infinite vectors, zero directions.
         """
-        origins, directions = _paired(origins, directions)
-        limits = _limits(max_distance, len(origins))
-        result = np.empty(len(origins), bool)
-
-        def run(part: slice) -> None:
-            rays = _prepared(origins, directions, part)
-            limit = limits[part].copy()  # Embree's binding wants to be able to write there
-            result[part] = self._scene.run(*rays, query="OCCLUDED", dists=limit) != -1
-
-        self._each_chunk(len(origins), run)
-        return result
+        ...
 
     def closest_hit(self, origins: Vectors, directions: Vectors) -> Hit:
         """The first surface that each ray meets. Arguments and errors as for `occluded`."""
-        origins, directions = _paired(origins, directions)
-        count = len(origins)
-        hit = Hit(
-            distance=np.empty(count, np.float32),
-            mesh=np.empty(count, np.int32),
-            face=np.empty(count, np.int32),
-            barycentric=np.empty((count, 3), np.float32),
-        )
-
-        def run(part: slice) -> None:
-            found = self._scene.run(*_prepared(origins, directions, part), output=True)
-            missed = found["geomID"] == -1
-            u, v = found["u"], found["v"]  # weights of vertices 1 and 2
-            weights = np.stack([np.maximum(1 - u - v, 0), u, v], axis=1)
-            hit.distance[part] = np.where(missed, np.inf, found["tfar"])
-            hit.mesh[part] = found["geomID"]
-            hit.face[part] = found["primID"]
-            hit.barycentric[part] = np.where(missed[:, None], 0, weights)
-
-        self._each_chunk(count, run)
-        return hit
-
-    def _each_chunk(self, count: int, run: Callable[[slice], None]) -> None:
-        size = min(max(-(-count // self._threads), _CHUNK[0]), _CHUNK[1])
-        parts = [slice(start, min(start + size, count)) for start in range(0, count, size)]
-        if len(parts) == 1:
-            run(parts[0])
-        else:  # Embree runs without the interpreter's lock, so threads are enough
-            list(self._pool.map(run, parts))
+        ...
 
 
-def _paired(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:
+def paired(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:
     """Both as (n, 3) NumPy arrays; one that all rays share is repeated without a copy."""
     arrays = {"origins": np.asarray(origins), "directions": np.asarray(directions)}
     for name, array in arrays.items():
@@ -143,7 +66,7 @@ def _paired(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:
     return starts, towards
 
 
-def _limits(max_distance: Any, count: int) -> np.ndarray:
+def limits_of(max_distance: Any, count: int) -> np.ndarray:
     """One float32 limit for each ray; one that all share is repeated without a copy."""
     if np.ndim(max_distance) not in (0, 1) or np.size(max_distance) not in (1, count):
         raise ValueError(
@@ -155,7 +78,7 @@ def _limits(max_distance: Any, count: int) -> np.ndarray:
     return np.broadcast_to(np.asarray(max_distance, np.float32), count)
 
 
-def _prepared(
+def prepared(
     origins: np.ndarray, directions: np.ndarray, part: slice
 ) -> tuple[np.ndarray, np.ndarray]:
     """One chunk as Embree wants it: contiguous float32, directions of unit length."""

@@ -78,7 +78,13 @@ def read_mesh(path: str | os.PathLike[str], *, up: Literal["z", "y"] = "z") -> M
 
 
 def _parse(data: bytes, suffix: str) -> tuple[np.ndarray, np.ndarray]:
-    import trimesh
+    try:
+        import trimesh
+    except ImportError as error:
+        raise ImportError(
+            "reading mesh files needs the package trimesh, which cannot be imported here; "
+            "make_mesh takes arrays without it"
+        ) from error
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

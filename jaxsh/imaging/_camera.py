@@ -9,7 +9,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from jaxsh.geometry import Mesh
+from ..geometry import Mesh
 
 
 def _point(x: Any) -> Array:

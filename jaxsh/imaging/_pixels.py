@@ -40,7 +40,13 @@ def read_pixels(path: Path) -> Float[np.ndarray, "h w 3"]:
 
 def _decode(path: Path) -> np.ndarray:
     """By OpenImageIO, which may stop halfway and say so later."""
-    import OpenImageIO as oiio
+    try:
+        import OpenImageIO as oiio
+    except ImportError as error:
+        raise ImportError(
+            f"{path}: reading {path.suffix} needs the package OpenImageIO, which cannot be "
+            "imported here; .pfm and .npy are read without it"
+        ) from error
 
     source = oiio.ImageInput.open(str(path))
     if source is None:

@@ -11,9 +11,8 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Bool, Float, Int
 
-from jaxsh.geometry import Mesh, RayScene
-
 from .._core.linalg import einsum
+from ..geometry import Mesh, RayScene, ray_scene
 from ._camera import Camera
 
 _rays = eqx.filter_jit(Camera.rays)
@@ -53,15 +52,15 @@ def rasterize(
 
     `samples` rays along each side of a pixel, on a regular grid: one is its centre, n give pictures
     n² + 1 shades of a silhouette and take n² times the memory. Exact at the samples (weights are
-    those in space, so perspective is right). Runs on the CPU through `RayScene`: neither traceable
-    nor differentiable. Frame after frame of a mesh at rest, give its `RayScene(mesh)` as `scene`,
-    so that its tree is built once. Raises `ValueError` for samples below 1.
+    those in space, so perspective is right). Runs through a `RayScene`: neither traceable nor
+    differentiable. Frame after frame of a mesh at rest, give its `ray_scene(mesh)` as `scene`, so
+    that its tree is built once. Raises `ValueError` for samples below 1.
     """
     if operator.index(samples) < 1:
         raise ValueError(f"a pixel needs at least 1 sample along its side, got {samples}")
     shape = (camera.height * samples, camera.width * samples)
     finer = dataclasses.replace(camera, height=shape[0], width=shape[1])
-    scene = RayScene(mesh) if scene is None else scene
+    scene = ray_scene(mesh) if scene is None else scene
     hit = scene.closest_hit(*_rays(finer))
     return Raster(
         jnp.asarray(hit.face.reshape(shape)),

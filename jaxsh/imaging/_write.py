@@ -52,7 +52,12 @@ def write_image(
 
 
 def _write(path: Path, pixels: np.ndarray) -> None:
-    import OpenImageIO as oiio
+    try:
+        import OpenImageIO as oiio
+    except ImportError as error:
+        raise ImportError(
+            f"{path}: writing pictures needs the package OpenImageIO, which cannot be imported here"
+        ) from error
 
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, _KINDS[pixels.dtype.name])

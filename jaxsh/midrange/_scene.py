@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import as_float
-from ..geometry import Mesh, RayScene
+from ..geometry import Mesh, RayScene, ray_scene
 from ..imaging import look_up
 from ..sphere import cube_map
 from ._emissive import EmissiveMesh
@@ -79,7 +79,7 @@ class Scene:
             return None
         vertices = jnp.asarray(corners.reshape(-1, 3), jnp.float32)
         faces = jnp.arange(len(vertices), dtype=jnp.int32).reshape(-1, 3)
-        return RayScene(Mesh(vertices, faces, jnp.zeros_like(vertices)))
+        return ray_scene(Mesh(vertices, faces, jnp.zeros_like(vertices)))
 
     def sky(self, resolution: int) -> Float[np.ndarray, "n 3"]:
         """The environment's mean over each texel of a cube, black without one; kept."""

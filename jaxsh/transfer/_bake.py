@@ -10,12 +10,12 @@ from jaxtyping import ArrayLike, Float
 
 from .. import geometry
 from .._core.checks import check_degree
-from ..geometry import Mesh, RayScene
+from ..geometry import Mesh, RayScene, ray_scene
 from ._blocks import Blocks, progress_bar
 from ._checkpoint import Checkpoint, fingerprint
 from ._directions import guided, turned_fibonacci
 from ._faults import check_arguments, report
-from ._gather import TILE, Scene, bounced, shadowed
+from ._gather import TILE, bounced, shadowed
 from ._receivers import receivers, surface, unshadowed
 from ._transfer import Transfer
 
@@ -29,7 +29,7 @@ def bake(
     bounces: int = 0,
     albedo: Float[ArrayLike, "*v"] = 0.5,
     offset: float = 1e-4,
-    scene: Scene | None = None,
+    scene: RayScene | None = None,
     seed: int = 0,
     chunk: int = 256,
     checkpoint: str | os.PathLike[str] | None = None,
@@ -60,8 +60,8 @@ def bake(
       nothing, and neither do further meshes of a `scene`.
     - `offset`: where rays start along the normal, as a share of half the mesh's longest extent
       along an axis. Smaller ones let faces shadow themselves, larger ones lose fine shadows.
-    - `scene`: what stops rays, where that is not the mesh alone: anything with the `occluded` and
-      `closest_hit` of `RayScene`. For bounces the mesh must be the first in it.
+    - `scene`: what stops rays, where that is not the mesh alone: any
+      `geometry.RayScene`. For bounces the mesh must be the first in it.
     - `chunk`: vertices in a block, rounded up to a multiple of 64. Each core works on one block.
     - `checkpoint`: a file that keeps the blocks finished so far. A bake that was stopped goes on
       from it when called again with the same arguments; it is removed when the bake is done. That
@@ -101,7 +101,7 @@ def bake(
             "seed": seed,
         }
         store = Checkpoint(checkpoint, identity, (TILE, coefficients.shape[1]), dtype)
-    scene = RayScene(mesh) if scene is None else scene
+    scene = ray_scene(mesh) if scene is None else scene
     with progress_bar((1 + bounces) * len(coefficients), progress) as bar:
         blocks = Blocks(coefficients.shape, dtype, chunk, store, bar)
         lights = guided(directions, degree, seed, dtype)

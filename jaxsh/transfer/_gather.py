@@ -1,14 +1,14 @@
 """What one block of vertices gathers: the light it does not get, and the light that bounces."""
 
 import math
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 import jax
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from .._core.linalg import matmul
-from ..geometry import Hit
+from ..geometry import RayScene
 from ._directions import Directions
 from ._receivers import Receivers, Surface
 
@@ -17,17 +17,8 @@ from ._receivers import Receivers, Surface
 TILE = 64
 
 
-@runtime_checkable
-class Scene(Protocol):
-    """What stops rays: `geometry.RayScene`, or anything that answers as it does."""
-
-    def occluded(self, origins, directions) -> Bool[np.ndarray, " n"]: ...
-
-    def closest_hit(self, origins, directions) -> Hit: ...
-
-
 def shadowed(
-    scene: Scene,
+    scene: RayScene,
     receivers: Receivers,
     directions: Directions,
     unshadowed: Float[np.ndarray, "v k"],
@@ -47,7 +38,7 @@ def shadowed(
 
 
 def _blocked(
-    scene: Scene,
+    scene: RayScene,
     origins: Float[np.ndarray, "rows 3"],
     directions: Directions,
     above: Bool[np.ndarray, "rows d"],
@@ -76,7 +67,7 @@ def _blocked(
 
 
 def bounced(
-    scene: Scene,
+    scene: RayScene,
     receivers: Receivers,
     vectors: Float[np.ndarray, "d 3"],
     surface: Surface,

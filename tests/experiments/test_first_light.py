@@ -8,7 +8,7 @@ import pytest
 from experiments.runner import Context, Data
 from experiments.runner.cli import main
 from experiments.sloan2002.reference import Pixels, Receivers, direct, one_bounce, turned
-from jaxsh.geometry import RayScene, make_mesh
+from jaxsh.geometry import make_mesh, ray_scene
 
 SMALL = {
     "degrees": [1, 4],
@@ -93,10 +93,10 @@ def test_reference_in_closed_form(tmp_path, rng):
     pixels = Pixels.of([np.ones((64, 128, 3)), 2 * np.ones((64, 128, 3))])
     white = [[np.pi] * 3 + [2 * np.pi] * 3] * 2
     directions = pixels.directions(np.arange(len(pixels.flux)), rng)
-    unshadowed, shadowed = direct(RayScene(mesh), floor, directions, pixels.flux, context)
+    unshadowed, shadowed = direct(ray_scene(mesh), floor, directions, pixels.flux, context)
     np.testing.assert_allclose(unshadowed, white, rtol=1e-3)
     np.testing.assert_allclose(shadowed, np.divide(white, 2), rtol=1e-3)
-    bounced = one_bounce(mesh, RayScene(mesh), floor, pixels, 0.4, 1e-4, 20_000, rng, context)
+    bounced = one_bounce(mesh, ray_scene(mesh), floor, pixels, 0.4, 1e-4, 20_000, rng, context)
     np.testing.assert_allclose(bounced, np.multiply(white, 0.4 / 2), rtol=0.03)
 
 

@@ -10,7 +10,7 @@ import shapes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jaxsh.geometry import JaxRayScene, Mesh, RayScene, _cast, knot, make_mesh, trace
+from jaxsh.geometry import EmbreeRayScene, JaxRayScene, Mesh, _cast, knot, make_mesh, trace
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -52,7 +52,7 @@ def assert_same_hits(one, other):
 @pytest.mark.parametrize("name", ["knot", "sphere"])
 def test_random_rays_hit_as_with_embree(bodies, name, rng):
     origins, directions = rng.normal(size=(2, 5000, 3)).astype(np.float32)
-    ours, embree = JaxRayScene(bodies[name]), RayScene(bodies[name])
+    ours, embree = JaxRayScene(bodies[name]), EmbreeRayScene(bodies[name])
     hit = embree.closest_hit(origins, directions)
     assert 0.1 < (hit.face >= 0).mean() < 0.9
     assert_same_hits(ours.closest_hit(origins, directions), hit)
@@ -74,7 +74,7 @@ def test_shadows_from_the_surface_are_those_of_embree(bodies, rng):
     directions = rng.normal(size=(5000, 3)).astype(np.float32)
     directions *= np.sign((directions * normals).sum(axis=1, keepdims=True))
     ours = JaxRayScene(mesh).occluded(origins, directions)
-    np.testing.assert_array_equal(ours, RayScene(mesh).occluded(origins, directions))
+    np.testing.assert_array_equal(ours, EmbreeRayScene(mesh).occluded(origins, directions))
     assert 0.1 < ours.mean() < 0.9
 
 
@@ -143,7 +143,7 @@ def test_several_meshes_keep_their_own_numbers(soup):
     assert hit.mesh.tolist() == [2, 2, 0, -1]
     assert hit.face.tolist() == [0, 1, 0, -1]
     np.testing.assert_allclose(hit.distance, [0.5, 0.5, 1, np.inf], rtol=1e-6)
-    assert_same_hits(hit, RayScene(meshes).closest_hit(origins, directions))
+    assert_same_hits(hit, EmbreeRayScene(meshes).closest_hit(origins, directions))
 
 
 def test_one_triangle_is_a_scene():
@@ -242,7 +242,7 @@ def test_the_core_misses_with_rays_that_are_none(soup):
     ],
 )
 def test_bad_rays_are_refused_with_the_same_words(unchecked, soup, origins, directions, message):
-    for scene in (JaxRayScene(soup), RayScene(soup)):
+    for scene in (JaxRayScene(soup), EmbreeRayScene(soup)):
         for ask in (scene.occluded, scene.closest_hit):
             with pytest.raises(ValueError, match=message):
                 ask(np.asarray(origins), np.asarray(directions))
@@ -274,6 +274,6 @@ def test_faces_that_are_not_finite_stop_no_ray(soup, rng):
 
 def test_without_embree_the_other_scene_is_named(monkeypatch, soup):
     monkeypatch.setitem(sys.modules, "embreex.mesh_construction", None)
-    with pytest.raises(ImportError, match="JaxRayScene answers the same questions"):
-        RayScene(soup)
+    with pytest.raises(ImportError, match="ray_scene gives a JaxRayScene then"):
+        EmbreeRayScene(soup)
     assert JaxRayScene(soup).occluded(np.zeros(3), np.ones(3)).shape == (1,)

@@ -9,7 +9,7 @@ import pytest
 import shapes
 from jax.test_util import check_grads
 
-from jaxsh.geometry import Mesh, RayScene, knot, make_mesh, vertex_normals
+from jaxsh.geometry import Mesh, knot, make_mesh, ray_scene, vertex_normals
 
 # Compiled once for all tests.
 JACOBIANS = [jax.jit(jac(vertex_normals)) for jac in (jax.jacfwd, jax.jacrev)]
@@ -199,7 +199,7 @@ def test_knot_does_not_touch_itself():
     vertices, normals = np.asarray(mesh.vertices), np.asarray(mesh.normals)
     # From every vertex outwards, the next surface along the normal is at least the gap away.
     # The smallest is 0.084 (the pipe is 0.37 thick).
-    hit = RayScene(mesh).closest_hit(vertices + 1e-4 * normals, normals)
+    hit = ray_scene(mesh).closest_hit(vertices + 1e-4 * normals, normals)
     assert hit.distance.min() > 0.08
     # And it shades itself: 41 % of its vertices see it along their normal.
     assert np.isfinite(hit.distance).mean() > 0.4

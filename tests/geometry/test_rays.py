@@ -7,7 +7,7 @@ import shapes
 from hypothesis import given
 from hypothesis import strategies as st
 
-from jaxsh.geometry import RayScene, _rays, knot, make_mesh
+from jaxsh.geometry import EmbreeRayScene, _embree, knot, make_mesh
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def soup():
 
 def test_hits_equal_those_of_the_slow_twin(soup, rng):
     origins, directions = rng.normal(size=(2, 3000, 3)).astype(np.float32)
-    hit = RayScene(soup).closest_hit(origins, directions)
+    hit = EmbreeRayScene(soup).closest_hit(origins, directions)
     distance, face, barycentric = shapes.first_hits(soup.vertices, soup.faces, origins, directions)
     np.testing.assert_array_equal(hit.face, face)
     np.testing.assert_array_equal(hit.mesh, np.where(face < 0, -1, 0))
@@ -34,7 +34,7 @@ def test_hits_equal_those_of_the_slow_twin(soup, rng):
 
 
 def test_occlusion_equals_that_of_the_slow_twin(soup, rng):
-    scene = RayScene(soup)
+    scene = EmbreeRayScene(soup)
     origins, directions = rng.normal(size=(2, 3000, 3))
     distance, *_ = shapes.first_hits(soup.vertices, soup.faces, origins, directions)
     np.testing.assert_array_equal(scene.occluded(origins, directions), np.isfinite(distance))
@@ -48,13 +48,13 @@ def test_barycentrics_weigh_vertices_in_the_order_of_the_face():
     mesh = make_mesh(vertices, np.array([[0, 1, 2]]))
     weights = np.array([[0.5, 0.375, 0.125], [0.125, 0.25, 0.625], [0.75, 0.125, 0.125]])
     points = weights @ vertices
-    hit = RayScene(mesh).closest_hit(points - [0, 0, 3], np.array([0.0, 0, 2]))
+    hit = EmbreeRayScene(mesh).closest_hit(points - [0, 0, 3], np.array([0.0, 0, 2]))
     np.testing.assert_allclose(hit.barycentric, weights, atol=1e-6)  # 6e-8 measured
     np.testing.assert_allclose(hit.distance, 3, rtol=1e-6)  # not 1.5: directions have no length
 
 
 def test_a_point_above_the_middle_of_a_square_sees_the_sky_past_its_edges():
-    scene = RayScene(make_mesh(*shapes.QUAD))
+    scene = EmbreeRayScene(make_mesh(*shapes.QUAD))
     above = np.array([0.5, 0.5, 1.0])
     angle = np.linspace(0, np.pi / 2, 90, endpoint=False) + 0.5 * np.pi / 180
     directions = np.stack([np.sin(angle), 0 * angle, -np.cos(angle)], axis=1)
@@ -65,7 +65,7 @@ def test_a_point_above_the_middle_of_a_square_sees_the_sky_past_its_edges():
 
 
 def test_max_distance_includes_what_lies_before_it():
-    scene = RayScene(make_mesh(*shapes.QUAD))
+    scene = EmbreeRayScene(make_mesh(*shapes.QUAD))
     origin, down = np.array([0.3, 0.6, 2.0]), np.array([0.0, 0.0, -0.1])
     assert scene.occluded(origin, down, 2.001).tolist() == [True]
     assert scene.occluded(origin, down, 1.999).tolist() == [False]
@@ -76,7 +76,7 @@ def test_max_distance_includes_what_lies_before_it():
 def test_from_inside_a_closed_mesh_every_ray_hits(rng):
     """Also those through edges and vertices: no cracks."""
     vertices, faces = shapes.sphere(16, 32)
-    scene = RayScene(make_mesh(vertices, faces))
+    scene = EmbreeRayScene(make_mesh(vertices, faces))
     middles = vertices[faces].mean(axis=1), vertices[faces[:, :2]].mean(axis=1), vertices
     directions = np.concatenate([*middles, rng.normal(size=(20_000, 3))])
     assert scene.occluded(np.zeros(3), directions).all()
@@ -85,7 +85,7 @@ def test_from_inside_a_closed_mesh_every_ray_hits(rng):
 def test_several_meshes_keep_their_own_numbers():
     vertices, faces = shapes.QUAD
     up = np.array([0, 0, 1], np.float32)
-    scene = RayScene([make_mesh(vertices + k * up, faces) for k in range(3)])
+    scene = EmbreeRayScene([make_mesh(vertices + k * up, faces) for k in range(3)])
     origins = np.array([[0.7, 0.2, 2.5], [0.2, 0.7, 1.5], [0.7, 0.2, -1.0], [5.0, 5.0, 1.5]])
     directions = np.array([[0, 0, -1], [0, 0, 1], [0, 0, 1], [0, 0, 1]])
     hit = scene.closest_hit(origins, directions.astype(float))
@@ -98,7 +98,7 @@ def test_several_meshes_keep_their_own_numbers():
 @pytest.mark.parametrize("kind", [np.asarray, jnp.asarray])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_one_vector_stands_for_all_and_any_array_will_do(soup, rng, kind, dtype):
-    scene = RayScene(soup)
+    scene = EmbreeRayScene(soup)
     origins = kind(rng.normal(size=(200, 3)).astype(dtype))
     one = kind(np.array([0.3, -0.4, 0.8], dtype))
     many = kind(np.tile(np.asarray(one), (200, 1)))
@@ -114,11 +114,11 @@ def test_chunks_and_threads_do_not_change_answers(chunk, threads):
     mesh = knot(1000)
     rng = np.random.default_rng(3)
     origins, directions = rng.normal(size=(2, 2000, 3)).astype(np.float32)
-    whole = RayScene(mesh)
+    whole = EmbreeRayScene(mesh)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_rays, "_CHUNK", (1, chunk))
-        patch.setattr(_rays, "cores", lambda: threads)
-        cut = RayScene(mesh)
+        patch.setattr(_embree, "_CHUNK", (1, chunk))
+        patch.setattr(_embree, "cores", lambda: threads)
+        cut = EmbreeRayScene(mesh)
         occluded, hit = cut.occluded(origins, directions), cut.closest_hit(origins, directions)
     np.testing.assert_array_equal(occluded, whole.occluded(origins, directions))
     for a, b in zip(hit, whole.closest_hit(origins, directions), strict=True):
@@ -126,7 +126,7 @@ def test_chunks_and_threads_do_not_change_answers(chunk, threads):
 
 
 def test_short_and_long_directions_are_directions():
-    scene = RayScene(make_mesh(*shapes.QUAD))
+    scene = EmbreeRayScene(make_mesh(*shapes.QUAD))
     down = np.array([0.0, 0.0, -1.0])
     for length in (1e-200, 1e-30, 1.0, 1e30, 1e200):
         hit = scene.closest_hit(np.array([0.3, 0.6, 2.0]), length * down)
@@ -145,7 +145,7 @@ def test_short_and_long_directions_are_directions():
     ],
 )
 def test_bad_rays_are_refused(unchecked, soup, origins, directions, message):
-    scene = RayScene(soup)
+    scene = EmbreeRayScene(soup)
     for ask in (scene.occluded, scene.closest_hit):
         with pytest.raises(ValueError, match=message):
             ask(np.asarray(origins), np.asarray(directions))
@@ -155,7 +155,7 @@ def test_bad_ray_is_named_across_chunks(soup):
     directions = np.ones((200_000, 3), np.float32)
     directions[123_456] = 0
     with pytest.raises(ValueError, match="ray 123456 "):
-        RayScene(soup).occluded(np.zeros(3), directions)
+        EmbreeRayScene(soup).occluded(np.zeros(3), directions)
 
 
 @pytest.mark.parametrize(
@@ -164,9 +164,9 @@ def test_bad_ray_is_named_across_chunks(soup):
 )
 def test_bad_limits_are_refused(unchecked, soup, limit, message):
     with pytest.raises(ValueError, match=message):
-        RayScene(soup).occluded(np.zeros((5, 3)), np.ones(3), limit)
+        EmbreeRayScene(soup).occluded(np.zeros((5, 3)), np.ones(3), limit)
 
 
 def test_a_scene_needs_a_mesh(unchecked):
     with pytest.raises(ValueError, match="at least one mesh"):
-        RayScene([])
+        EmbreeRayScene([])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from jax.test_util import check_grads
 
-from jaxsh.geometry import Mesh, RayScene, knot, make_mesh
+from jaxsh.geometry import Mesh, knot, make_mesh, ray_scene
 from jaxsh.imaging import Camera, interpolate, rasterize
 
 
@@ -138,7 +138,7 @@ def test_the_silhouette_of_a_sphere_is_the_projected_disc():
     mesh = make_mesh(ball.vertices, ball.faces)
     camera = Camera(position=(0.0, -4.0, 0.0), target=(0.0, 0.0, 0.0), width=200, height=150)
     raster = rasterize(mesh, camera)
-    kept = rasterize(mesh, camera, scene=RayScene(mesh))
+    kept = rasterize(mesh, camera, scene=ray_scene(mesh))
     np.testing.assert_array_equal(kept.face, raster.face)
     directions = np.asarray(camera.rays()[1]).reshape(150, 200, 3)
     # A ray meets the unit ball at distance 4 within asin(1/4) of the axis; the mesh lies inside

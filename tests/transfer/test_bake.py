@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsh.geometry import Mesh, RayScene, _rays, knot, make_mesh, neighbors
+from jaxsh.geometry import Mesh, _embree, knot, make_mesh, neighbors, ray_scene
 from jaxsh.harmonics import clamped_cosine, convolve, evaluate, rotate
 from jaxsh.transfer import _blocks, bake
 from jaxsh.transfer._directions import guided
@@ -49,7 +49,7 @@ def test_doubles_stay_doubles():
 
 def slow_twin(mesh, degree, directions, seed, vertices):
     """Every direction of the quadrature cast from every vertex, summed as the definition says."""
-    scene, quadrature = RayScene(mesh), guided(directions, 2, seed, np.dtype(float)).vectors
+    scene, quadrature = ray_scene(mesh), guided(directions, 2, seed, np.dtype(float)).vectors
     half_extent = np.ptp(np.asarray(mesh.vertices), axis=0).max() / 2
     rows = []
     for vertex in vertices:
@@ -92,7 +92,7 @@ WALL = bodies.rectangle([0, -1e4, -1e4], [0, 2e4, 0], [0, 0, 2e4])
 def test_a_vertical_wall_takes_half_of_the_sky():
     """Everything on its side of the horizon is blocked: the directions with x < 0."""
     floor = bodies.points([[1, 0, 0], [0.5, 3, 0]], [[0, 0, 1]] * 2)
-    coefficients = baked(floor, 6, scene=RayScene(WALL))
+    coefficients = baked(floor, 6, scene=ray_scene(WALL))
     exact = bodies.lune(0, np.pi / 2, 6)
     np.testing.assert_allclose(exact[0] * np.sqrt(4 * np.pi), np.pi / 2, rtol=1e-12)
     np.testing.assert_allclose(coefficients, [exact] * 2, atol=4e-3)  # 3.3e-3 measured
@@ -106,7 +106,7 @@ def test_a_point_in_a_groove(opening):
     """
     angle, width, distance = np.radians(opening), 2.0, 1.5
     side = [width * np.cos(angle), 0, width * np.sin(angle)]
-    scene = RayScene(bodies.rectangle([0, -1e4, 0], [0, 2e4, 0], side))
+    scene = ray_scene(bodies.rectangle([0, -1e4, 0], [0, 2e4, 0], side))
     receiver = bodies.points([[distance, 0, 0], [distance, 1, 0]], [[0, 0, 1]] * 2)
     psi = np.arctan2(side[2], distance - side[0])
     exact = bodies.lune(0, np.pi - psi, 6)
@@ -136,7 +136,7 @@ def test_a_seed_turns_the_directions():
 def test_chunks_and_threads_change_no_bit(monkeypatch, chunk, threads):
     mesh = knot(500)
     whole = baked(mesh, directions=256, bounces=1)
-    monkeypatch.setattr(_rays, "cores", lambda: threads)
+    monkeypatch.setattr(_embree, "cores", lambda: threads)
     monkeypatch.setattr(_blocks, "cores", lambda: threads)
     cut = baked(mesh, directions=256, bounces=1, chunk=chunk)
     np.testing.assert_array_equal(cut, whole)
@@ -176,7 +176,7 @@ def test_normals_by_hand_that_are_none_are_counted(normal):
 def test_a_scene_may_hold_more_than_the_mesh():
     mesh = bodies.ball()
     roof = bodies.rectangle([-50, -50, 1.5], [100, 0, 0], [0, 100, 0])
-    alone, under = baked(mesh), baked(mesh, scene=RayScene([mesh, roof]))
+    alone, under = baked(mesh), baked(mesh, scene=ray_scene([mesh, roof]))
     top = int(np.asarray(mesh.vertices)[:, 2].argmax())
     # What is left of the sky at the top is a rim at most 0.5/50 above the horizon.
     assert alone[top, 0] * np.sqrt(4 * np.pi) == pytest.approx(np.pi)

@@ -4,7 +4,7 @@ import bodies
 import numpy as np
 import pytest
 
-from jaxsh.geometry import RayScene, knot
+from jaxsh.geometry import knot, ray_scene
 from jaxsh.transfer import _blocks, bake
 
 MESH = knot(700)
@@ -14,7 +14,7 @@ class Stopping:
     """A ray scene that counts questions, and is interrupted at one of them."""
 
     def __init__(self, after=10**9):
-        self._scene, self.asked, self._after = RayScene(MESH), 0, after
+        self._scene, self.asked, self._after = ray_scene(MESH), 0, after
 
     def occluded(self, origins, directions):
         self._count()

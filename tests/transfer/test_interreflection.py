@@ -4,7 +4,7 @@ import bodies
 import numpy as np
 import pytest
 
-from jaxsh.geometry import Mesh, RayScene
+from jaxsh.geometry import Mesh, ray_scene
 from jaxsh.transfer import bake
 
 OPENING = np.radians(60)
@@ -70,7 +70,7 @@ def test_a_floor_gets_the_wall_s_light_by_its_form_factor():
 def test_other_meshes_of_the_scene_reflect_nothing():
     mesh = bodies.bowl(OPENING, 8, 20)
     lining = bodies.by_hand(0.999 * mesh.vertices, mesh.faces, mesh.normals)
-    options = {"scene": RayScene([mesh, lining]), "offset": 2e-3}
+    options = {"scene": ray_scene([mesh, lining]), "offset": 2e-3}
     # Rays that slip between the rims add 0.3 % at one vertex; all of the bowl would add 35 %.
     np.testing.assert_allclose(
         irradiance(mesh, bounces=1, **options), irradiance(mesh, **options), rtol=5e-3

@@ -1,0 +1,146 @@
+"""Ray casting: Embree where it is installed, in chunks, on every core; JAX elsewhere."""
+
+import functools
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from .._core.host import cores
+from ._cast import JaxRayScene
+from ._mesh import Mesh
+from ._rays import Hit, RayScene, Vectors, limits_of, paired, prepared
+
+# Rays in a chunk: few enough to share a call's rays between the cores, many enough that the cost
+# of a chunk is that of its rays.
+_CHUNK = (4_096, 65_536)
+
+
+def ray_scene(meshes: Mesh | Sequence[Mesh]) -> RayScene:
+    """Build a scene of one mesh or several, to be asked which rays they stop.
+
+    An `EmbreeRayScene` where the package embreex can be imported, and a `JaxRayScene` elsewhere:
+    the same questions and answers, slower on a CPU, which one `UserWarning` of the process says.
+    A later change of a mesh is not seen. Raises `ValueError` for an empty sequence.
+    """
+    if _embree() is None:
+        _warn_once()
+        return JaxRayScene(meshes)
+    return EmbreeRayScene(meshes)
+
+
+def _embree() -> Any:
+    """Embree's classes for a mesh and for a scene; None where they cannot be imported."""
+    try:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+    except ImportError:
+        return None
+    return TriangleMesh, EmbreeScene
+
+
+@functools.cache
+def _warn_once() -> None:
+    message = (
+        "embreex cannot be imported here, so rays are cast by JAX, which is slower on a CPU: "
+        "`pip install embreex` where it has wheels"
+    )
+    warnings.warn(message, UserWarning, stacklevel=3)
+
+
+class EmbreeRayScene:
+    """Meshes in an Embree scene, to be asked which rays they stop.
+
+    Takes one `Mesh` or a sequence of them; a later change of a mesh is not seen. Faces stop rays
+    from both sides. In Embree's robust mode, which still lets a very few rays slip through exactly
+    at an edge or a vertex (`JaxRayScene` lets none). Positions, directions and distances are
+    float32 within.
+
+    A ray that starts on a surface may hit it: start it a little off, along the normal.
+    Answers do not depend on the number of threads or on how rays are cut into chunks.
+    """
+
+    def __init__(self, meshes: Mesh | Sequence[Mesh]):
+        classes = _embree()
+        if classes is None:
+            raise ImportError(
+                "EmbreeRayScene needs embreex, which cannot be imported here: ray_scene gives a "
+                "JaxRayScene then, which answers the same questions"
+            )
+        build_mesh, build_scene = classes
+        meshes = [meshes] if isinstance(meshes, Mesh) else list(meshes)
+        if not meshes:
+            raise ValueError("EmbreeRayScene needs at least one mesh, got an empty sequence")
+        self._scene: Any = build_scene(robust=True)
+        for mesh in meshes:
+            vertices = np.ascontiguousarray(mesh.vertices, np.float32)
+            build_mesh(self._scene, vertices, np.ascontiguousarray(mesh.faces, np.int32))
+        # Embree builds its tree at the first query, and that must not happen on two threads.
+        self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+        self._threads = cores()
+
+    @functools.cached_property
+    def _pool(self) -> ThreadPoolExecutor:
+        """Started by the first query of many rays: few need no threads."""
+        return ThreadPoolExecutor(self._threads)
+
+    def occluded(
+        self,
+        origins: Vectors,
+        directions: Vectors,
+        max_distance: float | Float[Array | np.ndarray, " n"] = math.inf,
+    ) -> Bool[np.ndarray, " n"]:
+        """Whether anything lies on the ray within `max_distance` of its origin.
+
+        `origins` and `directions` are (n, 3), or (3,) for one that all rays share. Directions
+        need no unit length; distances are in the unit of the vertices.
+
+        Raises `ValueError` for wrong shapes, NaN or infinite vectors, zero directions.
+        """
+        origins, directions = paired(origins, directions)
+        limits = limits_of(max_distance, len(origins))
+        result = np.empty(len(origins), bool)
+
+        def run(part: slice) -> None:
+            rays = prepared(origins, directions, part)
+            limit = limits[part].copy()  # Embree's binding wants to be able to write there
+            result[part] = self._scene.run(*rays, query="OCCLUDED", dists=limit) != -1
+
+        self._each_chunk(len(origins), run)
+        return result
+
+    def closest_hit(self, origins: Vectors, directions: Vectors) -> Hit:
+        """The first surface that each ray meets. Arguments and errors as for `occluded`."""
+        origins, directions = paired(origins, directions)
+        count = len(origins)
+        hit = Hit(
+            distance=np.empty(count, np.float32),
+            mesh=np.empty(count, np.int32),
+            face=np.empty(count, np.int32),
+            barycentric=np.empty((count, 3), np.float32),
+        )
+
+        def run(part: slice) -> None:
+            found = self._scene.run(*prepared(origins, directions, part), output=True)
+            missed = found["geomID"] == -1
+            u, v = found["u"], found["v"]  # weights of vertices 1 and 2
+            weights = np.stack([np.maximum(1 - u - v, 0), u, v], axis=1)
+            hit.distance[part] = np.where(missed, np.inf, found["tfar"])
+            hit.mesh[part] = found["geomID"]
+            hit.face[part] = found["primID"]
+            hit.barycentric[part] = np.where(missed[:, None], 0, weights)
+
+        self._each_chunk(count, run)
+        return hit
+
+    def _each_chunk(self, count: int, run: Callable[[slice], None]) -> None:
+        size = min(max(-(-count // self._threads), _CHUNK[0]), _CHUNK[1])
+        parts = [slice(start, min(start + size, count)) for start in range(0, count, size)]
+        if len(parts) == 1:
+            run(parts[0])
+        else:  # Embree runs without the interpreter's lock, so threads are enough
+            list(self._pool.map(run, parts))
