@@ -86,16 +86,32 @@ def test_help_of_an_experiment_shows_fields_and_preset(toys, capsys):
         (["run", "toy", "--sed", "1"], "unknown option '--sed'; did you mean '--seed'?"),
         (["run", "toy", "--image-sise=4"], "did you mean '--image-size'?"),
         (["run", "toy", "--shadows", "no"], "unexpected argument 'no'"),
-        (["run", "toy", "--degrees", "1", "x"], "--degrees"),
-        (["run", "toy", "--image-size", "big"], "--image-size"),
-        (["run", "toy", "--kind", "exat"], "'exact', 'rough'"),
-        (["run", "toy", "--scale", "-1"], "scale should be positive, not -1.0"),
         (["run", "toy", "toy.second", "--scale", "2"], "overrides and --help are for one"),
         (["run", "toy", "--data", "nowhere"], "there is no data folder 'nowhere'"),
     ],
 )
 def test_mistakes_are_refused_in_one_sentence(toys, words, sentence):
     assert sentence in toys.refused(*words)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["run", "toy", "--degrees", "1", "x"], "--degrees"),
+        (["run", "toy", "--image-size", "big"], "--image-size"),
+        (["run", "toy", "--kind", "exat"], "exact"),
+        (["run", "toy", "--scale", "-1"], "scale should be positive, not -1.0"),
+    ],
+)
+def test_overrides_of_another_type_are_refused(toys, words, sentence):
+    """By tyro, which prints its own words."""
+    try:
+        code, _, stderr = toys(*words)
+    except SystemExit as stop:
+        code, stderr = stop.code, toys.capsys.readouterr().err
+    assert code == 2
+    assert sentence in stderr
+    assert not toys.out.exists()
 
 
 def test_overrides_are_typed(toys):
