@@ -146,7 +146,7 @@ def _scene(config: Figure15, context: Context) -> Scene:
             directions=config.directions,
             bounces=config.bounces,
             albedo=albedo.mean(axis=1).astype(np.float32),
-            offset=_OFFSET / _REACH,
+            ray_bias=_OFFSET / _REACH,
             progress=False,
         )
     camera = _camera(subject, config.height)

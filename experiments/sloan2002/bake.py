@@ -91,7 +91,7 @@ def bake(
         degree,
         directions=directions,
         albedo=albedo,
-        offset=OFFSET,
+        ray_bias=OFFSET,
         seed=context.seed,
         progress=False,
     )

@@ -97,7 +97,7 @@ def run(config: FirstLight, context: Context) -> list[Table]:
                 {name: np.asarray(environment) for name, environment in environments.items()},
                 albedo=config.albedo,
                 paths=config.paths,
-                offset=OFFSET,
+                ray_bias=OFFSET,
                 context=context,
             )
         for picture in pictures[-1]:

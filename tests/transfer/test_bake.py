@@ -11,8 +11,9 @@ import pytest
 
 from jaxsh.geometry import Mesh, _embree, knot, make_mesh, neighbors, ray_scene
 from jaxsh.harmonics import clamped_cosine, convolve, evaluate, rotate
-from jaxsh.transfer import _blocks, bake
-from jaxsh.transfer._directions import guided
+from jaxsh.transfer import bake
+from jaxsh.transfer._bake import _passes
+from jaxsh.transfer._bake._directions import guided
 
 
 def baked(mesh, degree=4, **options):
@@ -137,7 +138,7 @@ def test_chunks_and_threads_change_no_bit(monkeypatch, chunk, threads):
     mesh = knot(500)
     whole = baked(mesh, directions=256, bounces=1)
     monkeypatch.setattr(_embree, "cores", lambda: threads)
-    monkeypatch.setattr(_blocks, "cores", lambda: threads)
+    monkeypatch.setattr(_passes, "cores", lambda: threads)
     cut = baked(mesh, directions=256, bounces=1, chunk=chunk)
     np.testing.assert_array_equal(cut, whole)
 
@@ -191,8 +192,8 @@ def test_a_scene_may_hold_more_than_the_mesh():
         ({"bounces": -1}, "bounces must be an integer >= 0, got -1"),
         ({"chunk": 0}, "chunk must be an integer >= 1"),
         ({"bounces": 1, "shadows": False}, "bounces=1 needs rays"),
-        ({"offset": 0.0}, "offset must be finite and > 0, got 0.0"),
-        ({"offset": float("nan")}, "offset must be finite and > 0, got nan"),
+        ({"ray_bias": 0.0}, "ray_bias must be finite and > 0, got 0.0"),
+        ({"ray_bias": float("nan")}, "ray_bias must be finite and > 0, got nan"),
         ({"albedo": np.ones(3)}, r"albedo must be a number or have shape \(8,\), got shape \(3,\)"),
         ({"albedo": -0.1}, "albedo must be finite and >= 0"),
         ({"mesh": "ball.ply"}, "expected a jaxsh.geometry.Mesh, got str"),

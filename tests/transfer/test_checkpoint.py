@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from jaxsh.geometry import knot, ray_scene
-from jaxsh.transfer import _blocks, bake
+from jaxsh.transfer import bake
+from jaxsh.transfer._bake import _passes
 
 MESH = knot(700)
 
@@ -43,7 +44,7 @@ def whole():
 
 @pytest.mark.parametrize("share", [0.05, 0.3, 0.8, 0.97])
 def test_a_stopped_bake_goes_on_and_ends_the_same(tmp_path, monkeypatch, whole, share):
-    monkeypatch.setattr(_blocks, "cores", lambda: 1)
+    monkeypatch.setattr(_passes, "cores", lambda: 1)
     expected, questions = whole
     path = tmp_path / "folder" / "bake.part"
     first = Stopping(after=int(share * questions))
@@ -56,16 +57,19 @@ def test_a_stopped_bake_goes_on_and_ends_the_same(tmp_path, monkeypatch, whole, 
     assert not path.exists()
 
 
-@pytest.mark.parametrize("damage", ["cut", "flip"])
-def test_a_damaged_end_is_computed_again(tmp_path, whole, damage):
+@pytest.mark.parametrize("after", [18, 30])  # questions: in the first pass, and in the second
+@pytest.mark.parametrize("damage", ["cut", "flip", "flip the first pass"])
+def test_what_is_damaged_is_computed_again(tmp_path, whole, damage, after):
     path = tmp_path / "bake.part"
     with pytest.raises(KeyboardInterrupt):
-        run(Stopping(after=18), path)
+        run(Stopping(after=after), path)
     data = bytearray(path.read_bytes())
     if damage == "cut":
         del data[-100:]
-    else:
+    elif damage == "flip":
         data[-100] ^= 1
+    else:
+        data[data.index(b"\n") + 5000] ^= 1
     path.write_bytes(data)
     np.testing.assert_array_equal(run(Stopping(), path), whole[0])
 
@@ -77,7 +81,7 @@ def test_a_damaged_end_is_computed_again(tmp_path, whole, damage):
         ({"directions": 64}, "directions is 128, and 64 here"),
         ({"albedo": 0.3}, "albedo is"),
         ({"bounces": 2}, "bounces is 1, and 2 here"),
-        ({"offset": 1e-3}, "offset is"),
+        ({"ray_bias": 1e-3}, "ray_bias is"),
         ({"mesh": knot(800)}, "mesh is"),
     ],
 )

@@ -60,7 +60,7 @@ def test_a_floor_gets_the_wall_s_light_by_its_form_factor():
     for faces, share in ((mesh.faces, 0.6), (mesh.faces[:, ::-1], 0.0)):  # front, back
         turned = Mesh(mesh.vertices, faces, mesh.normals)
         direct, bounced = (
-            irradiance(turned, bounces=n, albedo=0.6, offset=1e-6)[-2:] for n in (0, 1)
+            irradiance(turned, bounces=n, albedo=0.6, ray_bias=1e-6)[-2:] for n in (0, 1)
         )
         # Nothing is before the wall, whose irradiance is π; to the floor it is half of the sky.
         np.testing.assert_allclose(direct, np.pi / 2, rtol=0.012)  # 1.05e-2 measured
@@ -70,7 +70,7 @@ def test_a_floor_gets_the_wall_s_light_by_its_form_factor():
 def test_other_meshes_of_the_scene_reflect_nothing():
     mesh = bodies.bowl(OPENING, 8, 20)
     lining = bodies.by_hand(0.999 * mesh.vertices, mesh.faces, mesh.normals)
-    options = {"scene": ray_scene([mesh, lining]), "offset": 2e-3}
+    options = {"scene": ray_scene([mesh, lining]), "ray_bias": 2e-3}
     # Rays that slip between the rims add 0.3 % at one vertex; all of the bowl would add 35 %.
     np.testing.assert_allclose(
         irradiance(mesh, bounces=1, **options), irradiance(mesh, **options), rtol=5e-3

@@ -1,4 +1,4 @@
-"""What one block of vertices gathers: the light it does not get, and the light that bounces."""
+"""One block of vertices: its shadowed coefficients, and those of a bounce."""
 
 import math
 from typing import NamedTuple
@@ -7,8 +7,8 @@ import jax
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from .._core.linalg import matmul
-from ..geometry import RayScene
+from ..._core.linalg import matmul
+from ...geometry import RayScene
 from ._directions import Directions
 from ._receivers import Receivers, Surface
 
@@ -21,10 +21,9 @@ def shadowed(
     scene: RayScene,
     receivers: Receivers,
     directions: Directions,
-    unshadowed: Float[np.ndarray, "v k"],
     rows: slice,
 ) -> Float[np.ndarray, "rows k"]:
-    """Coefficients of visibility times cosine: those of the cosine less those of what is blocked.
+    """Project visibility times cosine: the cosine's coefficients less those of the blocked part.
 
     The cosine's are exact, so that only the blocked part carries the error of the directions, and
     none is left where nothing is blocked. Exactly zero where no ray gets out.
@@ -32,7 +31,7 @@ def shadowed(
     cosines = _in_tiles(receivers.normals[rows], directions.vectors.T)
     above = cosines > 0
     blocked = _blocked(scene, receivers.origins[rows], directions, above)
-    coefficients = unshadowed[rows] - _in_tiles(cosines * blocked, directions.basis)
+    coefficients = receivers.unshadowed[rows] - _in_tiles(cosines * blocked, directions.basis)
     coefficients[above.any(axis=1) & (above == blocked).all(axis=1)] = 0
     return coefficients
 
@@ -43,7 +42,7 @@ def _blocked(
     directions: Directions,
     above: Bool[np.ndarray, "rows d"],
 ) -> Bool[np.ndarray, "rows d"]:
-    """Which directions above the surface are blocked, from as few rays as tell."""
+    """Find the blocked directions above the surface with as few rays as tell them."""
     blocked = np.zeros(above.shape, bool)
 
     def cast(wanted: Bool[np.ndarray, "rows d"]) -> None:
@@ -54,12 +53,14 @@ def _blocked(
     first = np.zeros_like(above)
     first[:, guides] = above[:, guides]
     cast(first)
+    if not len(directions.around):
+        return blocked
     answer = blocked[:, guides]
     known = above[:, guides]
     doubtful = ~known
     for other in directions.around:
         doubtful |= (answer != answer[:, other]) & known[:, other]
-    # To all directions at once: 0 lets light through, 1 stops it, 2 is to be asked.
+    # For all directions at once: 0 lets light through, 1 stops it, 2 is to be cast.
     told = np.take(np.where(doubtful, np.uint8(2), answer), nearest, axis=1)
     rest = above & ~first
     cast(rest & (told == 2))
@@ -74,7 +75,7 @@ def bounced(
     outgoing: Float[np.ndarray, "v k"],
     rows: slice,
 ) -> Float[np.ndarray, "rows k"]:
-    """Σ w max(0, n·ω) outgoing(hit) over the rays that meet the front of a face of the mesh.
+    """Sum w max(0, n·ω) outgoing(hit) over the rays that meet the front of a face of the mesh.
 
     `outgoing` is interpolated between the vertices of a face with the hit's barycentrics.
     """
@@ -95,7 +96,7 @@ def bounced(
 
 
 class _Rays(NamedTuple):
-    flat: Int[np.ndarray, " n"]  # where in the array of rows and directions
+    flat: Int[np.ndarray, " n"]  # index into the array of rows and directions
     row: Int[np.ndarray, " n"]
     origins: Float[np.ndarray, "n 3"]
     directions: Float[np.ndarray, "n 3"]
@@ -106,7 +107,7 @@ def _rays(
     directions: Float[np.ndarray, "d 3"],
     wanted: Bool[np.ndarray, "rows d"],
 ) -> _Rays:
-    """One ray for each pair that is wanted, row by row."""
+    """Make one ray for each pair that is wanted, row by row."""
     count = np.count_nonzero(wanted, axis=1)
     flat = np.flatnonzero(wanted)
     row = np.repeat(np.arange(len(wanted)), count)
@@ -118,9 +119,9 @@ def _rays(
 def _in_tiles(
     left: Float[np.ndarray, "rows n"], right: Float[np.ndarray | Array, "n k"]
 ) -> Float[np.ndarray, "rows k"]:
-    """Their product, `TILE` rows at a time, the last ones filled up with zeros.
+    """Multiply matrices, `TILE` rows at a time, the last ones filled up with zeros.
 
-    By XLA, whose threads get on with ours; OpenBLAS's spin, and would take the cores from rays.
+    By XLA, whose threads yield the cores while idle; OpenBLAS's spin, and take them from the rays.
     """
     result = np.empty((len(left), right.shape[1]), left.dtype)
     for start in range(0, len(left), TILE):

@@ -1,4 +1,4 @@
-"""The file of a bake under way: a line that says which bake, then one record per finished tile."""
+"""Checkpoint file of a bake: a line that identifies the bake, one record per finished tile."""
 
 import hashlib
 import json
@@ -8,14 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Shaped
 
 _FORMAT = {"format": "jaxsh bake checkpoint", "version": 1}
 
 
 class Checkpoint:
-    """Tiles of one shape and dtype, appended in order; each with a checksum, so that one cut off
-    half-way counts as not there.
+    """Keeps tiles of one shape and dtype in a file, in order of their number.
+
+    Each has a checksum, so that one cut off half-way counts as missing. Nothing but the file
+    remembers how many there are.
     """
 
     def __init__(
@@ -34,21 +36,26 @@ class Checkpoint:
         _check(self._path, _FORMAT | identity)
         self._start = len(header)
 
-    def read(self) -> list[np.ndarray]:
-        """The tiles finished so far; what follows them is cut off."""
+    def read(self, first: int, count: int) -> Shaped[np.ndarray, "tiles rows k"]:
+        """Return those of `count` tiles that are finished, from number `first` on.
+
+        At a missing or damaged one it stops, and cuts the file off there, so that the next tile
+        appended has that number.
+        """
         size = int(np.prod(self._shape)) * self._dtype.itemsize
         tiles = []
         with self._path.open("r+b") as file:
-            file.seek(self._start)
-            while len(record := file.read(size + 4)) == size + 4:
+            file.seek(self._start + first * (size + 4))
+            while len(tiles) < count:
+                record = file.read(size + 4)
                 if zlib.crc32(record[:size]).to_bytes(4, "little") != record[size:]:
+                    file.truncate(self._start + (first + len(tiles)) * (size + 4))
                     break
                 tiles.append(np.frombuffer(record[:size], self._dtype).reshape(self._shape))
-            file.truncate(self._start + len(tiles) * (size + 4))
-        return tiles
+        return np.array(tiles, self._dtype).reshape(-1, *self._shape)
 
     def append(self, tiles: np.ndarray) -> None:
-        """Add finished tiles; they are on disk before this returns."""
+        """Append finished tiles; they are on disk before this returns."""
         with self._path.open("ab") as file:
             for tile in tiles:
                 data = tile.tobytes()
@@ -61,7 +68,7 @@ class Checkpoint:
 
 
 def fingerprint(*arrays: Array | np.ndarray) -> str:
-    """Hexadecimal digits that tell arrays from others."""
+    """Hash dtypes, shapes and bits of arrays to hexadecimal digits."""
     digest = hashlib.sha256()
     for array in map(np.asarray, arrays):
         digest.update(f"{array.dtype}{array.shape}".encode())

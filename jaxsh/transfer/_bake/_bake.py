@@ -1,4 +1,4 @@
-"""The bake: rays for every vertex, projected."""
+"""Baking transfer: rays for every vertex, projected."""
 
 import functools
 import math
@@ -8,16 +8,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from .. import geometry
-from .._core.checks import check_degree
-from ..geometry import Mesh, RayScene, ray_scene
-from ._blocks import Blocks, progress_bar
+from ... import geometry
+from ..._core.checks import check_degree
+from ...geometry import Mesh, RayScene, ray_scene
+from .._transfer import Transfer
 from ._checkpoint import Checkpoint, fingerprint
 from ._directions import guided, turned_fibonacci
 from ._faults import check_arguments, report
 from ._gather import TILE, bounced, shadowed
-from ._receivers import receivers, surface, unshadowed
-from ._transfer import Transfer
+from ._passes import Passes, progress_bar
+from ._receivers import receivers, surface
 
 
 def bake(
@@ -28,22 +28,22 @@ def bake(
     shadows: bool = True,
     bounces: int = 0,
     albedo: Float[ArrayLike, "*v"] = 0.5,
-    offset: float = 1e-4,
+    ray_bias: float = 1e-4,
     scene: RayScene | None = None,
     seed: int = 0,
     chunk: int = 256,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: bool = True,
 ) -> Transfer:
-    """Transfer of a mesh: for each vertex ∫ V(ω) max(0, n·ω) y_i(ω) dω, measured with rays.
+    """Bake the transfer of a mesh: for each vertex ∫ V(ω) max(0, n·ω) y_i(ω) dω, by rays.
 
-    Sloan, Kautz & Snyder 2002, "Precomputed radiance transfer". One even set of directions, turned
-    at random by `seed`, serves all vertices. Two things spend rays where they tell most:
+    Sloan, Kautz & Snyder 2002, "Precomputed radiance transfer". All vertices share one even set
+    of directions, turned at random by `seed`. Rays are spent where they matter most:
 
-    - What is blocked is measured and taken from the cosine's exact coefficients. Where nothing is
-      blocked no error is left.
+    - The blocked part is measured and subtracted from the cosine's exact coefficients. Where
+      nothing is blocked no error is left.
     - The set holds 2¼ times `directions`. Half of `directions`, spread evenly over it, are cast
-      first, and others only next to where neighbours among these disagree: along the edges of
+      first, and others only next to where neighbors among these disagree: along the edges of
       shadows. A blocker so thin that it lies between them is missed.
 
     **Arguments**
@@ -58,37 +58,45 @@ def bake(
       of an even set of `directions` that leaves a vertex, again from every vertex.
     - `albedo`: of the bounces only, a number or one per vertex (V,). Backs of faces reflect
       nothing, and neither do further meshes of a `scene`.
-    - `offset`: where rays start along the normal, as a share of half the mesh's longest extent
+    - `ray_bias`: where rays start along the normal, as a share of half the mesh's longest extent
       along an axis. Smaller ones let faces shadow themselves, larger ones lose fine shadows.
-    - `scene`: what stops rays, where that is not the mesh alone: any
-      `geometry.RayScene`. For bounces the mesh must be the first in it.
+    - `scene`: the surfaces that stop rays, where these are not the mesh alone: any
+      `geometry.RayScene`. For bounces the mesh must be the first in it. By default
+      `geometry.ray_scene(mesh)`, which casts by JAX where Embree is not installed.
     - `chunk`: vertices in a block, rounded up to a multiple of 64. Each core works on one block.
     - `checkpoint`: a file that keeps the blocks finished so far. A bake that was stopped goes on
-      from it when called again with the same arguments; it is removed when the bake is done. That
-      the `scene` is the same is yours to see to.
-    - `progress`: a bar, where standard error is a terminal and the bake takes more than a second.
+      from it when called again with the same arguments; it is removed when the bake is done. It
+      does not record `scene`: pass the same one when you resume.
+    - `progress`: shows a bar when standard error is a terminal and the bake takes over a second.
 
     **Returns** a `Transfer` of the dtype of the mesh's vertices. On one machine a seed gives the
     same bits whatever the chunk, the number of threads and the interruptions.
 
-    Where the normal is undefined (it is zero, NaN or infinite, or the vertex's faces cancel), and
-    where all rays are blocked, as they are inside the mesh, the direct light's coefficients are
-    zero, and one `UserWarning` counts these vertices.
+    The direct light's coefficients are zero where the normal is undefined (it is zero, NaN or
+    infinite, or the vertex's faces cancel) and where all rays are blocked, as they are inside the
+    mesh; one `UserWarning` counts these vertices.
 
     Raises `ValueError` for arguments and values out of range, and for the checkpoint of another
-    bake. Not differentiable: visibility is a step.
+    bake. Runs in NumPy on the host, outside `jit`, and does not shard: give the result's arrays to
+    `jax.device_put`. Not differentiable: visibility is a step.
+
+    **Example**
+
+    >>> from jaxsh import geometry, transfer
+    >>> baked = transfer.bake(geometry.knot(300), degree=2, directions=64)
+    >>> baked.coefficients.shape, baked.degree
+    ((300, 9), 2)
     """
     degree = check_degree(degree)
-    check_arguments(mesh, directions, shadows, bounces, albedo, offset, chunk)
-    points = receivers(mesh, offset)
-    coefficients = unshadowed(points.normals, degree)
-    dtype = coefficients.dtype
-    reflected = np.asarray(albedo, dtype).reshape(-1, 1) / math.pi
+    check_arguments(mesh, directions, shadows, bounces, albedo, ray_bias, chunk)
+    points = receivers(mesh, ray_bias, degree)
     if not shadows:
-        report(points.normals, coefficients)
-        return _transfer(mesh, coefficients)
+        report(points.normals, points.unshadowed)
+        return _transfer(mesh, points.unshadowed)
 
-    store = None
+    shape, dtype = points.unshadowed.shape, points.unshadowed.dtype
+    reflected = np.asarray(albedo, dtype).reshape(-1, 1) / math.pi
+    file = None
     if checkpoint is not None:
         identity = {
             "mesh": fingerprint(mesh.vertices, mesh.faces, mesh.normals),
@@ -96,27 +104,26 @@ def bake(
             "directions": directions,
             "bounces": bounces,
             "albedo": fingerprint(reflected),
-            "offset": float(offset),
+            "ray_bias": float(ray_bias),
             "scene": scene is not None,
             "seed": seed,
         }
-        store = Checkpoint(checkpoint, identity, (TILE, coefficients.shape[1]), dtype)
+        file = Checkpoint(checkpoint, identity, (TILE, shape[1]), dtype)
     scene = ray_scene(mesh) if scene is None else scene
-    with progress_bar((1 + bounces) * len(coefficients), progress) as bar:
-        blocks = Blocks(coefficients.shape, dtype, chunk, store, bar)
+    with progress_bar((1 + bounces) * len(points.normals), progress) as bar:
+        passes = Passes(shape, dtype, chunk, file, bar)
         lights = guided(directions, degree, seed, dtype)
-        direct = blocks.fill(functools.partial(shadowed, scene, points, lights, coefficients))
+        direct = passes.run(0, functools.partial(shadowed, scene, points, lights))
         report(points.normals, direct)
         coefficients = direct
         vectors, met = turned_fibonacci(directions, seed, dtype), surface(mesh)
-        for _ in range(bounces):
-            # T_{b+1} = T_0 + ∫ over what is blocked of cosine · albedo/π · T_b where it is met.
-            gather = functools.partial(
-                bounced, scene, points, vectors, met, reflected * coefficients
-            )
-            coefficients = direct + blocks.fill(gather)
-    if store:
-        store.remove()
+        for bounce in range(1, bounces + 1):
+            # T_{b+1} = T_0 + ∫ over blocked directions of cosine · albedo/π · T_b at the hit.
+            outgoing = reflected * coefficients
+            gather = functools.partial(bounced, scene, points, vectors, met, outgoing)
+            coefficients = direct + passes.run(bounce, gather)
+    if file:
+        file.remove()
     return _transfer(mesh, coefficients)
 
 

@@ -1,4 +1,4 @@
-"""What may be wrong with a mesh and with what is asked of it, said before or after the rays."""
+"""Checks of `bake`: its arguments before the rays, unlit vertices after them."""
 
 import math
 import warnings
@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from .._core.checks import check_size
-from ..geometry import Mesh
+from ..._core.checks import check_size
+from ...geometry import Mesh
 
 
 def check_arguments(
@@ -17,10 +17,10 @@ def check_arguments(
     shadows: bool,
     bounces: int,
     albedo: Any,
-    offset: float,
+    ray_bias: float,
     chunk: int,
 ) -> None:
-    """`bake`'s arguments, or a `ValueError` that says what is wrong with one of them."""
+    """Raise `ValueError` that says which of `bake`'s arguments is wrong, and how."""
     if not isinstance(mesh, Mesh):
         raise ValueError(f"expected a jaxsh.geometry.Mesh, got {type(mesh).__name__}")
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
@@ -38,8 +38,8 @@ def check_arguments(
     check_size("chunk", chunk)
     if bounces and not shadows:
         raise ValueError(f"bounces={bounces} needs rays, and shadows=False casts none")
-    if not (math.isfinite(offset) and offset > 0):
-        raise ValueError(f"offset must be finite and > 0, got {offset!r}")
+    if not (math.isfinite(ray_bias) and ray_bias > 0):
+        raise ValueError(f"ray_bias must be finite and > 0, got {ray_bias!r}")
     share = np.asarray(albedo)
     if share.shape not in ((), (len(vertices),)):
         raise ValueError(
@@ -50,7 +50,7 @@ def check_arguments(
 
 
 def report(normals: Float[np.ndarray, "v 3"], direct: Float[np.ndarray, "v k"]) -> None:
-    """One warning, on behalf of `bake`, about vertices that no light reaches directly."""
+    """Warn once, on behalf of `bake`, about vertices that no light reaches directly."""
     undefined = ~normals.any(axis=1)
     blind = ~direct.any(axis=1) & ~undefined
     found = [

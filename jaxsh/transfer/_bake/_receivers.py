@@ -1,4 +1,4 @@
-"""What gathers light: points off the surface and their normals, with what is wrong about them."""
+"""Receivers of light: points off the surface, their normals, their unshadowed coefficients."""
 
 import functools
 from typing import NamedTuple
@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ..geometry import Mesh
-from ..harmonics import clamped_cosine, convolve, evaluate, num_coefficients
+from ...geometry import Mesh
+from ...harmonics import clamped_cosine, convolve, evaluate, num_coefficients
 
 # Faces cancel where the sum of their area vectors is but the rounding of its terms.
 _CANCELLED = 8 * np.finfo(np.float32).eps
@@ -17,33 +17,36 @@ _UP, _BLOCK = np.array([0, 0, 1]), 1024
 
 
 class Receivers(NamedTuple):
-    """V points that light may reach, with the way they face (NumPy arrays)."""
+    """Holds V points that gather light (NumPy arrays)."""
 
     origins: Float[np.ndarray, "v 3"]  # of rays, a little off the surface; float32
     normals: Float[np.ndarray, "v 3"]  # unit, zero where undefined
+    unshadowed: Float[np.ndarray, "v k"]  # of the clamped cosine alone; zero about a zero normal
 
 
 class Surface(NamedTuple):
-    """What light bounces off."""
+    """Holds the faces that light bounces off."""
 
     faces: Int[np.ndarray, "f 3"]
     outward: Float[np.ndarray, "f 3"]  # normals of any length
 
 
 def surface(mesh: Mesh) -> Surface:
+    """Take the mesh's faces, with their outward normals."""
     faces = np.asarray(mesh.faces)
     return Surface(faces, _areas(np.asarray(mesh.vertices, np.float64)[faces]))
 
 
-def receivers(mesh: Mesh, offset: float) -> Receivers:
-    """The mesh's vertices, moved along their normals by `offset` half-extents."""
-    vertices, normals = np.asarray(mesh.vertices), unit_normals(mesh)
+def receivers(mesh: Mesh, ray_bias: float, degree: int) -> Receivers:
+    """Take the mesh's vertices; rays start `ray_bias` half-extents along their normals."""
+    vertices, normals = np.asarray(mesh.vertices), _unit_normals(mesh)
     half_extent = np.ptp(vertices, axis=0).max() / 2
-    return Receivers((vertices + offset * half_extent * normals).astype(np.float32), normals)
+    origins = (vertices + ray_bias * half_extent * normals).astype(np.float32)
+    return Receivers(origins, normals, _unshadowed(normals, degree))
 
 
-def unshadowed(normals: Float[np.ndarray, "v 3"], degree: int) -> Float[np.ndarray, "v k"]:
-    """Coefficients λ_l y_lm(n) of the clamped cosine about each normal, zero about a zero one."""
+def _unshadowed(normals: Float[np.ndarray, "v 3"], degree: int) -> Float[np.ndarray, "v k"]:
+    """Expand the clamped cosine about each normal: λ_l y_lm(n), zero about a zero normal."""
     defined = normals.any(axis=1, keepdims=True)
     basis = basis_at(np.where(defined, normals, _UP.astype(normals.dtype)), degree)
     lambdas = np.asarray(_cosine_lambdas(degree), basis.dtype)
@@ -51,7 +54,7 @@ def unshadowed(normals: Float[np.ndarray, "v 3"], degree: int) -> Float[np.ndarr
 
 
 def basis_at(vectors: Float[np.ndarray, "n 3"], degree: int) -> Float[np.ndarray, "n k"]:
-    """y_i at each vector, block by block: one compiled program serves any number of them."""
+    """Evaluate y_i at each vector in blocks: one compiled program serves any number of them."""
     blocks = -(-len(vectors) // _BLOCK)
     padded = np.tile(_UP.astype(vectors.dtype), (blocks * _BLOCK, 1))
     padded[: len(vectors)] = vectors
@@ -64,11 +67,11 @@ def _cosine_lambdas(degree: int) -> Float[Array, " k"]:
     return convolve(jnp.ones(num_coefficients(degree)), clamped_cosine(degree))
 
 
-def unit_normals(mesh: Mesh) -> Float[np.ndarray, "v 3"]:
-    """The mesh's normals at unit length, and zero where they say nothing.
+def _unit_normals(mesh: Mesh) -> Float[np.ndarray, "v 3"]:
+    """Scale the mesh's normals to unit length; undefined ones become zero.
 
-    That is where they are zero, NaN or infinite, and where a vertex's faces cancel, so that the
-    mean of their normals is rounding. A vertex in no face keeps the normal that it has.
+    Undefined are those that are zero, NaN or infinite, and those of a vertex whose faces cancel, so
+    that the mean of their normals is rounding. A vertex in no face keeps the normal that it has.
     """
     normals = np.asarray(mesh.normals)
     with np.errstate(invalid="ignore"):
