@@ -19,7 +19,6 @@ from .irradiance import (
 )
 from .methods import (
     EXPONENTS,
-    PSNR,
     Rule,
     Trial,
     box_grid,
@@ -234,16 +233,16 @@ def _tables(
         line[f"{row['distance']:g}"] = row["psnr"]
     lines = dict(sorted(lines.items(), key=lambda item: item[0][1]))
     distances = [Column(f"{d:g}", f"{d:g}", digits=1) for d in config.distances]
-    note = (
-        f"{subject.name}, {len(subject.mesh.vertices):,} vertices, degree {config.degree}, "
-        f"shadowed transfer, three squares of side {config.side:g}; columns: their distance from "
-        f"the origin, in the object's radius. {PSNR}Samples have exact coefficients and gradients, "
-        "so the error is the method's alone. Grids span the bounding box, inner ones (grid_around) "
-        "are drawn in. For eq. 16 the best exponent of "
-        f"{', '.join(f'{b:g}' for b in EXPONENTS)} at each entry."
-    )
     columns = [Column("samples", "samples"), Column("method", "method"), *distances]
-    yield Table("PSNR by light distance and samples, dB", columns, list(lines.values()), note)
+    yield Table(
+        "PSNR by light distance and samples, dB",
+        columns,
+        list(lines.values()),
+        values={
+            "subject": subject,
+            "exponents": ", ".join(f"{b:g}" for b in EXPONENTS),
+        },
+    )
     yield _verdicts(config, errors, box)
     yield _goals(config, lines)
     yield _rival_table(config, [row for row in rows if "rival" in row], middle)
@@ -282,13 +281,7 @@ def _verdicts(config: Claims, errors: list[dict[str, Any]], box: float) -> Table
             }
         )
     columns = [Column("claim", "claim"), Column("measured", "measured"), Column("holds", "holds")]
-    note = (
-        f'Sufficient: at least {enough:g} dB. The paper\'s "nearby" is "closer than the distance '
-        "from the sample position to the object's bounding box (empirically determined)\", which "
-        f"is {box:.2f} here along the way to the lights; it does not say from where closeness "
-        "is measured."
-    )
-    return Table("The paper's claims", columns, verdicts, note)
+    return Table("The paper's claims", columns, verdicts, values={"enough": enough, "box": box})
 
 
 def _span(psnrs: dict[float, float]) -> str:
@@ -326,8 +319,7 @@ def _goals(config: Claims, lines: dict[tuple[str, int], dict[str, Any]]) -> Tabl
         rows.append(row)
     distances = [Column(f"{d:g}", f"{d:g}", digits=1) for d in config.distances]
     columns = [Column("goal", "goal"), Column("least", "at least", digits=0), *distances]
-    note = "In dB, by the lights' distance. The goals were set for a mid-range one."
-    return Table("Goals", columns, rows, note)
+    return Table("Goals", columns, rows)
 
 
 def _rival_table(config: Claims, rivals: list[dict[str, Any]], middle: float) -> Table:
@@ -337,11 +329,6 @@ def _rival_table(config: Claims, rivals: list[dict[str, Any]], middle: float) ->
         Column("whole", "PSNR against the whole irradiance, dB", digits=1),
         Column("cut off", "against that of its degree, dB", digits=1),
     ]
-    note = (
-        f"Lights at {middle:g}, no shadows, no transfer: irradiance, exact by Lambert's formula. "
-        "Ward & Heckbert's records lie on the surface and hold for its own normals, with both "
-        "gradients exact and weights 1 / (|x - x_i| / R_i + √(1 - n·n_i)), to the best power; "
-        "ours are taken anywhere, hold for all normals, and end at "
-        f"degree {config.degree}, which bounds them by the last line."
+    return Table(
+        "Irradiance gradients, the older rival", columns, rivals, values={"middle": middle}
     )
-    return Table("Irradiance gradients, the older rival", columns, rivals, note)

@@ -180,19 +180,7 @@ def _tables(config: Figure15, rows: list[dict[str, Any]]) -> Iterator[Table]:
         Column("psnr_vertices", "of the vertices, dB", digits=1),
         Column("relative", "relative RMS error of the vertices, %", digits=2),
     ]
-    note = (
-        f"Three squares of side {config.side:g}, red, green and blue, {config.distance:g} from "
-        "the origin, where the meshes have a bounding sphere of radius 1: left, right, and above "
-        f"behind. Light and shadowed transfer of degree {config.degree}, albedo "
-        f"{config.albedo:g}. The reference has the exact light of each vertex (polygon_harmonics), "
-        "cut at the same degree; so has the light named exact at the samples. Samples are at the "
-        "centroid of the vertices or at the corners of the bounding box. PSNR is of linear "
-        "radiance, exposed so that the 99th percentile of the object's pixels in the reference is "
-        "1, which is the peak; pixels are clipped there, vertices are not. The whole picture "
-        "counts the background, which is the same in both. Bird and hand are stand-ins for the "
-        "paper's, which gives no numbers for these figures."
-    )
-    yield Table("Three area lights", columns, rows, note)
+    yield Table("Three area lights", columns, rows)
     yield _goals(rows)
 
 
@@ -216,8 +204,4 @@ def _goals(rows: list[dict[str, Any]]) -> Table:
         Column("least", "at least, dB", digits=1),
         Column("measured", "measured, dB", digits=1),
     ]
-    note = (
-        "Of the object's pixels, the light from cubes unless it says exact. Set on another scene; "
-        "all but the first depend on how near the lights are."
-    )
-    return Table("Goals", columns, lines, note)
+    return Table("Goals", columns, lines)

@@ -174,14 +174,8 @@ def _table(config: Figure4, subject: Subject) -> Table:
         *(Column(f"{name}, vertices", f"{name}, vertices, dB", digits=1) for name in _ORDERS),
         Column("with gradient, picture", "with gradient, whole picture, dB", digits=1),
     ]
-    note = (
-        f"{subject.name}, {len(subject.mesh.vertices):,} vertices, moved along x under a square of "
-        f"side {config.side:g}, {config.height:g} above the sample and {config.forward:g} before "
-        "it, which it faces; lengths in radii of the mesh's bounding sphere. One cube of "
-        f"{config.resolution}² texels to a face at the centroid of the vertices in the middle "
-        f"position serves all; degree {config.degree}. PSNR of the object's pixels, of linear "
-        "radiance, clipped at the peak of 1, to which the exposure takes the 99th percentile of "
-        "the reference in the middle; of vertices, not clipped. The whole picture counts the "
-        "background, which is the same in both. The paper gives no numbers for this figure."
+    return Table(
+        "A head under a local light",
+        columns,
+        values={"subject": subject},
     )
-    return Table("A head under a local light", columns, note=note)

@@ -164,12 +164,4 @@ def _table(config: Figure6, name: str) -> Table:
         *(Column(order, f"{order}, %", digits=1) for order in _ORDERS),
         Column("its own cube", "its own cube, projected, %", digits=1),
     ]
-    note = (
-        f"{name} under three squares of side {config.side:g}, {config.distance:g} from the "
-        "origin, lengths in radii of the mesh's bounding sphere. Relative L2 error over the sphere "
-        f"of the light of degree {config.degree} (that of its coefficients) against exact "
-        f"coefficients at the vertex; one sample, a cube of {config.resolution}² texels to a face, "
-        "at the centroid of the vertices. The last column is what the cube's texels alone cost. "
-        'The paper shows cubes and calls the extrapolated one and the reference "very similar".'
-    )
-    return Table("Incident light at a vertex", columns, note=note)
+    return Table("Incident light at a vertex", columns, values={"name": name})

@@ -14,7 +14,7 @@ from jaxsh import imaging, midrange
 from ..runner import Column, Context, Table, experiment
 from ..shared.plots import Panel, View, draw_panels
 from .dots import glass
-from .methods import PSNR, Trial, box_grid, take
+from .methods import Trial, box_grid, take
 from .overlap import overlapping, overlapping_light
 from .scenes import Subject, cut, load
 
@@ -166,20 +166,11 @@ def _table(config: Figure7, rows: list[dict[str, Any]], subject: Subject) -> Tab
     for n in config.resolutions:
         columns.append(Column(f"psnr {n}", f"PSNR, cubes of {n}², dB", digits=1))
     columns.append(Column(f"exponent {config.resolutions[0]}", "b of eq. 16", digits=0))
-    note = (
-        f"{subject.name}, {len(subject.mesh.vertices):,} vertices, degree {config.degree}, two "
-        "lights, of which the blue one hides the red one from the object's top and not from its "
-        f"foot. {PSNR}Samples are radiance cubes: one at the centroid, eight k-means, or eight at "
-        "the corners of the bounding box, interpolated trilinearly. Of the exponents "
-        "of eq. 16 the best is shown, which favours the paper: it does not give its own. "
-        '"Gradient" is the paper\'s (eq. 11), which takes what is visible not to change; "edge '
-        'gradient" has the motion of shadows in it.'
-    )
     return Table(
         "One sample against eight, where one light hides another",
         columns,
         list(lines.values()),
-        note,
+        values={"subject": subject},
     )
 
 
@@ -214,8 +205,4 @@ def _verdicts(config: Figure7, rows: list[dict[str, Any]]) -> Table:
         for claim, measured, holds in lines
     ]
     columns = [Column("claim", "claim"), Column("measured", "measured"), Column("holds", "holds")]
-    note = (
-        f"With cubes of {config.resolutions[0]}². Similarly: within 3 dB. Virtually the same: at "
-        "least 40 dB."
-    )
-    return Table("What the paper says of it", columns, verdicts, note)
+    return Table("What the paper says of it", columns, verdicts)

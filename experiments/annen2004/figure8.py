@@ -92,17 +92,9 @@ def _tables(config: Figure8, rows: list[dict[str, Any]]) -> Iterator[Table]:
         line = lines.setdefault(key, dict(zip(("method", "scene"), key, strict=True)))
         line[f"{row['distance']:g}"] = row["error"]
     shown = [Column(f"{distance:g}", f"at {distance:g}", digits=2) for distance in _SHOWN]
-    note = (
-        "Of incident radiance in the red channel, as the paper's: RMS over all directions (by "
-        f"Parseval, degree {config.degree}) and over {config.directions} positions at each "
-        "distance from the sample at the object's centroid; in the RMS radiance at the sample "
-        f"without the blocker. Distances in the object's radius. The sample is a cube of "
-        f"{config.resolution}²; the truth is exact at each position. The scene is that of figure "
-        "7; without the blocker the blue light is gone."
-    )
     title = "Error of extrapolated radiance by distance, %"
     columns = [Column("method", "method"), Column("scene", "scene"), *shown]
-    yield Table(title, columns, list(lines.values()), note)
+    yield Table(title, columns, list(lines.values()))
     ratios = []
     for method in (*_ORDERS, _EDGES):
         with_it, without = lines[method, "with the blocker"], lines[method, "without it"]

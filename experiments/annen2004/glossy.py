@@ -138,12 +138,9 @@ def _draw(config: Glossy, path: Path, view: View, shaded: dict[str, Array], refe
 def _table(config: Glossy, rows: list[dict[str, Any]], subject: Subject) -> Table:
     columns = [Column("surface", "surface, exponent")]
     columns += [Column(name, f"{name}, dB", digits=1) for name in (*_ORDERS, *_GRIDS.values())]
-    note = (
-        f"{subject.name}, {len(subject.mesh.vertices):,} vertices; three squares of side "
-        f"{config.side:g}, {config.distance:g} from the origin; degree {config.degree}. PSNR of "
-        "the object's pixels, linear and exposed so that the reference's 99th percentile is 1. "
-        "The reference has the exact light of each vertex through the same lobe and transfer, cut "
-        "at the same degree; so are the samples' coefficients and derivatives exact. The paper "
-        "names glossy transfer as possible (§4.2) and shows none."
+    return Table(
+        "Glossy surfaces near light",
+        columns,
+        rows,
+        values={"subject": subject},
     )
-    return Table("Glossy surfaces near light", columns, rows, note)

@@ -20,12 +20,6 @@ EXPONENTS = (1.0, 2.0, 4.0, 6.0, 8.0)
 _FILL = 256
 _NODES = 400  # samples on each triangle of a light, where derivatives are those of its integral
 
-PSNR = (
-    "PSNR is over the vertices' linear radiance, not clipped; its peak is the 99th percentile of "
-    "their largest channel in the reference. The reference has the exact light of each vertex, "
-    "cut at the same degree. "
-)
-
 
 class Blend(NamedTuple):
     """The best of several exponents of eq. 16, by PSNR."""

@@ -12,7 +12,7 @@ from jaxsh import midrange, transfer
 
 from ..habel2008.cost import interleaved
 from ..runner import Column, Context, Table, experiment
-from .methods import PSNR, Trial, expand, inner_grid, take
+from .methods import Trial, expand, inner_grid, take
 from .plots import draw_orders
 from .scenes import Subject, cut, exact_light, load, three_lights
 
@@ -156,16 +156,12 @@ def _tables(
         Column("cubes", "PSNR, cubes, dB", digits=1),
         Column("front", "on the front"),
     ]
-    note = (
-        f"{subject.name}, {len(subject.mesh.vertices):,} vertices, degree {config.degree}, "
-        f"float32; three squares of side {config.side:g} at {config.distance:g}. One sample is at "
-        f"the centroid, others on a grid drawn in from the bounding box, with the half rule, "
-        f"whose weights are made once. {PSNR}Exact terms are derivatives of the integral over the "
-        f"lights; cubes are of {config.resolution}², and their own error is that of texels. Times: "
-        f"the fastest of {config.rounds} rounds in which all take turns. The front: nothing is "
-        "both faster and, with exact terms, better."
+    yield Table(
+        "Cost and error by order and samples",
+        columns,
+        shown,
+        values={"subject": subject},
     )
-    yield Table("Cost and error by order and samples", columns, shown, note)
     yield _cheapest(rows, len(subject.mesh.vertices), exact)
 
 
@@ -184,13 +180,16 @@ def _cheapest(rows: Sequence[dict[str, Any]], vertices: int, exact: float) -> Ta
         Column("total", "total, ms", digits=2),
         Column("exact", "PSNR, exact terms, dB", digits=1),
     ]
-    note = (
-        f"{answer(rows)} The exact light of each vertex takes {exact:.0f} ms for three "
-        "flat lights that nothing hides, so with such lights no slower way is worth its time; a "
-        "cube costs the same whatever it sees, and one for each vertex would take "
-        f"{vertices * _one_cube(rows) / 1e3:.0f} s."
+    return Table(
+        "The cheapest way to a quality",
+        columns,
+        lines,
+        values={
+            "answer": answer(rows),
+            "exact": exact,
+            "exact_ms": vertices * _one_cube(rows) / 1000.0,
+        },
     )
-    return Table("The cheapest way to a quality", columns, lines, note)
 
 
 def _one_cube(rows: Sequence[dict[str, Any]]) -> float:

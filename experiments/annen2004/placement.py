@@ -14,7 +14,7 @@ from jaxsh import harmonics, imaging, midrange
 from ..runner import Column, Context, Table, experiment
 from ..shared.plots import Panel, View, draw_panels
 from .dots import glass
-from .methods import EXPONENTS, PSNR, Trial, exact_samples, inner_grid
+from .methods import EXPONENTS, Trial, exact_samples, inner_grid
 from .plots import draw_frames, draw_placement
 from .scenes import (
     RED,
@@ -237,16 +237,16 @@ def _tables(
             if method != _GRID
         ),
     ]
-    note = (
-        f"{subject.name}, {len(subject.mesh.vertices):,} vertices, degree {config.degree}; three "
-        f"squares of side 1. {PSNR}Samples have exact coefficients and gradients, blended by eqs. "
-        f"15 and 16 with the best exponent of {', '.join(f'{b:g}' for b in EXPONENTS)}; those of "
-        "the grid by the half rule. The error is what greedy makes small, with the exponent 6: "
-        "relative RMS error of the irradiance, over all vertices and all normals alike, not only "
-        "those that the vertices have. It knows the light at 128 of the vertices."
-    )
     ordered = [lines[key] for key in sorted(lines)]
-    yield Table("PSNR by placement and samples", columns, ordered, note)
+    yield Table(
+        "PSNR by placement and samples",
+        columns,
+        ordered,
+        values={
+            "subject": subject,
+            "exponents": ", ".join(f"{b:g}" for b in EXPONENTS),
+        },
+    )
     columns = [
         Column("frame", "frame"),
         Column("samples", "samples"),

@@ -33,6 +33,11 @@ class Subject(NamedTuple):
     baked: transfer.Transfer
 
     @property
+    def about(self) -> str:
+        """Its name and size, for a note."""
+        return f"{self.name}, {len(self.mesh.vertices):,} vertices"
+
+    @property
     def centroid(self) -> Float[Array, " 3"]:
         """Of the vertices: where the paper takes a single sample (§5)."""
         return jnp.mean(self.mesh.vertices, axis=0)

@@ -180,15 +180,7 @@ def _tables(
             Column(f"frame {_EXACT}", f"{_EXACT}", digits=1),
         ],
         models,
-        "Whole frames, medians of "
-        f"{config.frames} of each kind, in turns: lights move, so the scene is built and traced "
-        f"anew into a cube of {config.resolution}² texels to a face; it is projected to degree "
-        f"{config.degree}, all vertices are shaded, {_SIZE} × {_SIZE} rays find the faces (in "
-        "the mesh's own search tree, built once), colours are "
-        "interpolated and encoded. All on the CPU: the paper's "
-        "frames, of 2004, have the cube, the vertices and the raster on a GPU. "
-        "Exact per vertex: no sample, polygon_harmonics at each vertex. Bird and tooth are "
-        "stand-ins. Compiling is not included.",
+        values={"size": _SIZE},
     )
     yield Table(
         "The same without the raster",
@@ -200,8 +192,6 @@ def _tables(
             Column(f"still {_EXACT}", f"{_EXACT}", digits=1),
         ],
         models,
-        "As for a camera at rest: trace, project, shade and draw. This is the harder reading of "
-        "the ratio, since the raster takes equally long either way.",
     )
     yield Table(
         "Milliseconds by stage",
@@ -211,13 +201,12 @@ def _tables(
             *(Column(stage, stage, digits=2) for stage in (*_STAGES, "frame")),
         ],
         stages,
-        "Exact per vertex, project is the light of all vertices, which shading then reads.",
     )
     yield Table(
         "Goals",
         [Column("goal", "goal"), Column("limit", "limit"), Column("measured", "measured")],
         _goals(models[0], stages[:2]),
-        f"On {models[0]['mesh']}; set for Max Planck.",
+        values={"mesh": models[0]["mesh"]},
     )
 
 

@@ -267,13 +267,7 @@ def _memory(context: Context) -> Table:
         Column("made of", "made of"),
         Column("bytes", "bytes", paper="bytes_paper"),
     ]
-    note = (
-        'The paper says "131 KB for 7 bands and 28KB for 4 bands", in thousands of bytes: '
-        "131,712 is the first to the last digit given, and its formula gives 43,008 for the "
-        "second, which only two channels make 28,672. Ours leaves out the weights with m < 0, "
-        "which are zero until the sky is turned to the sun."
-    )
-    return Table("Memory", columns, rows, note)
+    return Table("Memory", columns, rows)
 
 
 def _stored() -> dict[str, np.ndarray]:
@@ -291,15 +285,7 @@ def _times(config: Cost, rows: list[dict[str, Any]]) -> Iterator[Table]:
         Column("error", "worst E_mean, %"),
         Column("relative", "worst relative error, %"),
     ]
-    note = (
-        "7 bands, all turned to the sun's azimuth; float32 unless said. All take turns; the "
-        f'fastest of {config.rounds} rounds. Compiling is apart, in environment.json. "As it is" '
-        "checks the range of its arguments and finds the compiled function. The samples are of "
-        "the sky's hemisphere alone, on a Fibonacci spiral, the harmonics tabulated "
-        "beforehand. Errors are against exact projection in float64, on random suns. The "
-        "paper's time is of a Pentium 4 of 3.2 GHz. "
-    )
-    yield Table("Time for 7 bands", columns, timed, note + verdict(timed))
+    yield Table("Time for 7 bands", columns, timed, values={"verdict": verdict(timed)})
 
 
 def verdict(rows: list[dict[str, Any]]) -> str:

@@ -333,12 +333,9 @@ def _table(config: Figure15, context: Context, chosen) -> Table:
         Column("shade_ms", "coefficients and shading, ms", digits=2),
         Column("frame_ms", "the whole picture, ms", digits=0),
     ]
-    note = (
-        f"{config.bands} bands under eq. 5's window, turbidity {config.turbidity:g}, latitude "
-        f"{config.latitude:g}°, declination {config.declination:g}°. The sun is a direction, with "
-        f"a shadow ray from each of the {config.samples}² samples of a pixel. The bake took "
-        f"{context.times['bake']['seconds']:.1f} s. The first picture's times include compiling. "
-        "Reinhard's curve; its exposure follows the picture's log-mean luminance to the power "
-        f"{_ADAPTATION:g}."
+    return Table(
+        "Through the day",
+        columns,
+        [context.rows[i] for i in chosen],
+        values={"bake_seconds": context.times["bake"]["seconds"], "adaptation": _ADAPTATION},
     )
-    return Table("Through the day", columns, [context.rows[i] for i in chosen], note)

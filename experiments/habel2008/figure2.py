@@ -106,10 +106,6 @@ def figure2(config: Figure2, context: Context) -> Table:
             Column("pixel", "largest error of the luminance, % of the mean sky", digits=4),
             Column("truncation", "RMS of what the bands leave out, % of the mean sky", digits=1),
         ],
-        note=f"Worst of {config.suns} suns and {config.turbidities} turbidities for each number "
-        "of bands, by eq. 3 with the smallest luminance of the hemisphere for L_min; the worst of "
-        "the three channels. The paper's own worst case is 7 bands at 90 degrees and turbidity 6. "
-        "What any fit adds is far below what the bands leave out.",
     )
 
 

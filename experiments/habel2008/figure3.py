@@ -39,13 +39,6 @@ from .suns import (
 _READINGS: tuple[Reading, ...] = get_args(Reading)
 _STORED_BANDS = 7  # of the paper's tables and of those that the package comes with
 
-_NOTE = (
-    "Upper bounds of eqs. 3 and 2, the worst of all suns, turbidities and channels, in float64 but "
-    "where it says float32. L_min is the smallest luminance of the sky's hemisphere at that sun "
-    'and turbidity. The paper\'s figures are its bounds ("below 1.5 %", "< 0.005 %") on what '
-    "112 numbers per weight do: for its own polynomials, and for others to be held against. "
-)
-
 
 @dataclasses.dataclass(frozen=True)
 class Figure3:
@@ -233,7 +226,9 @@ def _tables(config: Figure3, rows: list[dict[str, Any]]) -> Iterator[Table]:
         )
     ]
     without = "" if any(row["family"] == "published" for row in rows) else _NO_TABLES
-    yield Table("Worst errors at 5 and 7 bands", [*models, *compared], known, _NOTE + without)
+    yield Table(
+        "Worst errors at 5 and 7 bands", [*models, *compared], known, values={"without": without}
+    )
     for key, name in (("mean", "E_mean"), ("max", "E_max")):
         by_bands = [Column(f"{key} {n}", f"{n}") for n in range(1, config.bands + 1)]
         title, note = f"{name} by bands, %", "Stored tables end at 7 bands."
@@ -253,14 +248,8 @@ def _by_reading(rows: list[dict[str, Any]], models: list[Column]) -> Table:
         "mean range": "of all settings",
     }
     columns = [Column(key, heading) for key, heading in headings.items()]
-    note = (
-        'The paper does not say what its "minimum intensity of the original data" is the minimum '
-        "of. Luminance in all columns but the second, which leaves blue out where it turns "
-        "negative (low suns), as then it has no meaning. The projected sky is that of 7 bands, "
-        "over the upper hemisphere, for all numbers of bands."
-    )
     title = "E_mean under each reading of L_min, %"
-    return Table(title, [*models[:1], Column("bands", "bands"), *columns], lines, note)
+    return Table(title, [*models[:1], Column("bands", "bands"), *columns], lines)
 
 
 def _by_model(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -121,10 +121,6 @@ def _tables(config: Figure4, rows: list[dict[str, Any]]) -> list[Table]:
             Column("cost", "horizontal irradiance, %", digits=2),
             Column("blur", "change of the light, % of its norm", digits=1),
         ],
-        note=f"Luminance at {config.bands} bands, turbidity {config.turbidity:g}, in units of the "
-        "mean of the sky's hemisphere. Below the horizon all should be zero. The irradiance is "
-        "that of level ground by the clamped cosine's own bands, beside the exact one. Dering is "
-        "the least window without negative light in any channel.",
     )
     shares = Table(
         '"Only the zonal part rings"',
@@ -133,7 +129,6 @@ def _tables(config: Figure4, rows: list[dict[str, Any]]) -> list[Table]:
             Column("nonzonal", "energy below the horizon that is not zonal, %", digits=1),
         ],
         [row for row in rows if row["window"] == "none"],
-        note="The paper filters zonal terms alone. What it leaves untouched grows as the sun sets.",
     )
     return [ringing, shares]
 

@@ -226,16 +226,12 @@ def _tables(config: Solvers, problem: Problem, rows: list[dict[str, Any]]) -> It
         Column("error_float32", "evaluated in float32, %"),
     ]
     problems, samples = problem.targets.shape
-    note = (
-        f"Polynomials of degree 13 in θ and 7 in τ for {problems} weights of {config.bands} bands "
-        f"(all with m ≥ 0, three channels), on {samples} Chebyshev nodes, in float64; tolerance "
-        f"{_TOLERANCE:.1e}, at most {config.max_steps} steps, from zero. Steps of the weight that "
-        "takes the most, and the word on the one that fails, if one does. jaxopt returns no "
-        "result code: its own error is held against its tolerance here. The least residual is "
-        "that of LAPACK's least squares in Chebyshev polynomials. E_mean (eq. 3) is the worst on "
-        "suns between the nodes, the ends included, evaluated in two precisions."
+    yield Table(
+        "Solvers by basis",
+        columns,
+        rows,
+        values={"problems": problems, "samples": samples, "tolerance": _TOLERANCE},
     )
-    yield Table("Solvers by basis", columns, rows, note)
     lines = [row for row in rows if row["solver"] == next(iter(_SOLVERS))]
     yield Table(
         "Bases",
@@ -247,6 +243,4 @@ def _tables(config: Solvers, problem: Problem, rows: list[dict[str, Any]]) -> It
             columns[-1],
         ],
         lines,
-        "Of the matrix of the least-squares problem: the product of those of its two factors, "
-        "since beyond 1e16 float64 cannot tell it of the whole. Coefficients by linear QR.",
     )

@@ -158,12 +158,14 @@ def _table(config: Colors, context: Context, name: str, total: int, problem: Pro
         Column("gap", "most apart from nnls"),
         Column("ms", "time, ms", digits=1),
     ]
-    note = (
-        f"{name}: {len(problem.matrix):,} of its {total:,} vertices, drawn at random; degree "
-        f"{config.degree}; four squares of {config.size:g} radii a side, {config.distance:g} radii "
-        f"away, with radiances from 0.3 to 4, the fourth, beside the second, off. Condition of the "
-        f"unknowns {np.linalg.cond(problem.matrix):.1f}. {config.repeats} draws of Gaussian noise "
-        "relative to the mean, independent at each vertex and channel. Ours starts from the "
-        "shapes, so its time has the light at the vertices in it, which the others are given."
+    return Table(
+        "Colours of known lights",
+        columns,
+        rows,
+        values={
+            "name": name,
+            "seen": len(problem.matrix),
+            "total": total,
+            "condition": np.linalg.cond(problem.matrix),
+        },
     )
-    return Table("Colours of known lights", columns, rows, note)

@@ -242,15 +242,9 @@ def _table(config: Emitters, context: Context, name: str, total: int, seen: int)
         Column("steps", "steps", digits=0),
         Column("seconds", "time, s", digits=1),
     ]
-    note = (
-        f"{name}: {seen:,} of its {total:,} vertices, drawn at random; degree {config.degree}, "
-        f"albedo {config.albedo:g}. {config.settings} scenes for each number of lights: rectangles "
-        "of 0.4 to 0.9 radii a side, 1.4 to 2.2 radii away, in any direction, not quite facing "
-        "the mesh, any colour; they do not hide each other. All of it is unknown, the pose too. "
-        f"Starts: of {config.candidates} random guesses (1.8 radii away, 0.65 a side, facing the "
-        f"mesh), the {config.starts} that explain most with the best colours of their own. "
-        "Observed is what the same exact model shades, plus Gaussian noise relative to its mean, "
-        "independent at each vertex and channel. Time is that of guesses and starts together, the "
-        "median; the first of each number of lights compiles."
+    return Table(
+        "Area lights from a shaded mesh",
+        columns,
+        rows,
+        values={"name": name, "seen": seen, "total": total},
     )
-    return Table("Area lights from a shaded mesh", columns, rows, note)

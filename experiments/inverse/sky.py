@@ -160,13 +160,9 @@ def _table(config: InverseSky, context: Context, name: str, vertices: int) -> Ta
         Column("agreeing", "starts that end in the same place, %", digits=0),
         Column("ms", "time of a fit, ms", digits=0),
     ]
-    note = (
-        f"{name}, {vertices:,} vertices, degree {config.degree}; {config.settings} suns, evenly "
-        "over the hemisphere, with turbidities from 2.5 to 6. Observed is what the exact "
-        "projection shades, plus Gaussian noise relative to its mean, independent at each vertex "
-        "and channel; that one is independent is why so many vertices average it away. "
-        "Without noise the error is that of the shipped fit of the sky, and the fit's own "
-        "expectation, which takes errors for independent, knows nothing of it. Goal: 0.1 degrees "
-        "and 0.02 without noise."
+    return Table(
+        "Sun and turbidity from a shaded mesh",
+        columns,
+        rows,
+        values={"name": name, "vertices": vertices},
     )
-    return Table("Sun and turbidity from a shaded mesh", columns, rows, note)

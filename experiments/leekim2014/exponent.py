@@ -8,9 +8,7 @@ import numpy as np
 
 from ..runner import Column, Context, Table, experiment
 from .methods import (
-    HOW,
     METHODS,
-    WHAT,
     Method,
     adaptive_way,
     baselines,
@@ -104,7 +102,5 @@ def _tables(config: Exponent, rows: list[dict[str, Any]], row: Row) -> Iterator[
         "Errors and gains by exponent",
         columns,
         rows,
-        f"{row.mesh} under {row.environment} at degree {row.degree}; the normalised lobe, the "
-        "exposure anew for each exponent. Kept: after the last level; of probes: what is computed "
-        f"in full beside them. {WHAT}{HOW}",
+        values={"row": row},
     )

@@ -55,7 +55,7 @@ def figure1(config: Figure1, context: Context) -> Table:
         f"tiles; and the differences of both from full, × {config.gain:g}"
     )
     draw_panels(context.path("figure1.png", caption), evened(panels))
-    return Table("Against the full computation", columns(), note=_note(config))
+    return Table("Against the full computation", columns())
 
 
 def shadings(scene: Scene, look: Look) -> Iterator[Shading]:
@@ -105,26 +105,6 @@ def columns() -> list[Column]:
         Column("psnr_object", "of the object's pixels, dB", digits=2),
         Column("psnr_vertex", "of the vertices, dB", digits=2),
     ]
-
-
-def describe(look: Look) -> str:
-    """What thresholds, readings and errors are."""
-    return (
-        f"Thresholds {look.threshold:g} (specular) and {look.diffuse_threshold:g} (diffuse). A "
-        "vertex that leaves the filter keeps the level at which it left (algorithm 1). Refined and "
-        "smoothed, it goes back to the base as the text has it, and neighbours of the region join "
-        "until nobody does (§4.4): the paper does not say which reading is its own; "
-        "`leekim2014.threshold` takes the choices apart. PSNR is of exposed linear "
-        "colour, clipped to [0, 1], at 512² pixels on black; the object's pixels alone are the "
-        "stricter measure. Multiply-adds are those of the specular products. "
-    )
-
-
-def _note(config: Figure1) -> str:
-    return (
-        f"{describe(config)}The paper's {_PSNR} dB is of its own scene, which its caption does not "
-        "name, at degree 10. Times are in `leekim2014.table1`."
-    )
 
 
 def _panels(config: Figure1, scene: Scene, full, by: dict[str, Shading]) -> Iterator[Panel]:

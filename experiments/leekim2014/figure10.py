@@ -209,13 +209,4 @@ def _table(config: Figure10, context: Context) -> Table:
         Column("switched", "degree changes, share of vertices", digits=3),
         Column("motion", "RMS change of the full computation", digits=5),
     ]
-    note = (
-        f"{config.frames} frames, {config.step:g}° apart. The error is from the full computation "
-        "under the same, windowed light, in exposed linear colour clipped to [0, 1], over vertices "
-        "that face the eye in both frames. Flicker is how it changes from frame to frame at each "
-        f"vertex. Thresholds {config.threshold:g} and {config.diffuse_threshold:g}; with "
-        f"hysteresis those inside stay at {config.leave:g} times that. Tiles are the nearest of "
-        f"{config.views} views: between some frames the set changes; kept tiles are those of the "
-        "first frame. Dering is the least window without negative light in any channel."
-    )
-    return Table("A spinning mesh", columns, context.rows, note)
+    return Table("A spinning mesh", columns, context.rows)

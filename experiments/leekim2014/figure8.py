@@ -140,10 +140,4 @@ def _table(config: Figure8, rows: list[dict[str, Any]]) -> Table:
         Column("above", "share that changes by the threshold", digits=2),
         Column("kept", "share that the filter keeps", digits=2),
     ]
-    note = (
-        f"Diffuse light in exposed linear colour; threshold {config.diffuse_threshold:g} of the "
-        "largest channel. The filter keeps fewer than change by the threshold: who has left once "
-        "does not come back. The paper's figure has no numbers; its table 1 filters 9 to 19 % of "
-        "diffuse vertices out."
-    )
-    return Table("Diffuse light by level", columns, rows, note)
+    return Table("Diffuse light by level", columns, rows)

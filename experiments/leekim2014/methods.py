@@ -34,17 +34,6 @@ TURN = 0.05  # of the light from frame to frame, in radians
 Light = Float[Array, "3 k"]
 Way = Callable[[Light], Any]
 
-WHAT = (
-    "einsum: equation 5 as an einsum of three operands. Product form: R = [α L̂; L] O, tile by tile "
-    "of 1,024 vertices, as one matrix product. Full: `transfer.shade_glossy` of sampled transfer, "
-    "the same result as a sum over exact nodes, without L̂. "
-)
-HOW = (
-    f"Float32 on the CPU; medians of frames, all ways taking turns of {_BURST} frames in one run, "
-    "the light turning in every frame; compiling and what is made once per mesh (samples, probes, "
-    "tiles) are not included. two_stage, probes and tiles keep the transfer in eight bits. "
-)
-
 
 def baselines(scene: Scene) -> dict[str, Way]:
     """The full computation in three forms, slowest first."""

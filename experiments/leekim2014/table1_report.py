@@ -6,7 +6,7 @@ from typing import Any
 
 from ..runner import Column, Table
 from .columns import IN_FULL, per_method
-from .methods import DIFFUSE, EIGHT_BITS, HOW, STILL, WHAT, Method
+from .methods import DIFFUSE, EIGHT_BITS, STILL, Method
 from .scenes import Row
 
 # What figures 1 and 9 print, of scenes that the paper does not name.
@@ -32,12 +32,7 @@ def tables(
             *per_method("fps", methods, "adaptive_paper"),
         ],
         scenes,
-        f"{WHAT}Eye product: `transfer.eye_product`, the same for an eye that stands still, one "
-        f"product with rows made beforehand; no other column makes use of that. {HOW}The paper's "
-        "frames are of ANOTHER MACHINE, an Intel i7 3770 of 4 cores at "
-        "3.4 GHz, in C++ with OpenMP, and hold the drawing too; ours are of shading alone, on the "
-        "machine named below. masks and levels are the paper's method with its thresholds. "
-        f"{_checked(scenes)}",
+        values={"checked": _checked(scenes)},
     )
     yield Table(
         "Gains and errors",
@@ -55,11 +50,6 @@ def tables(
             Column("rival_psnr_object", "its object PSNR", digits=1),
         ],
         lines,
-        "PSNR against the full result, at the probe's own direction: linear colour, exposed so "
-        "that the 99th percentile over vertices that face the eye is 1, clipped. Image: 512² "
-        "pixels with a black background; object: its pixels alone; vertices: those that face the "
-        "eye. Truncation: everyone at the highest lower degree that takes no longer than the "
-        "method; full, and no error, where the method is slower than full.",
     )
     yield Table(
         "The diffuse part in eight bits",
@@ -70,9 +60,6 @@ def tables(
             Column("psnr_eight_bits", "object PSNR, dB", digits=1),
         ],
         scenes,
-        "`transfer.shade_diffuse` of the transfer, and of what `transfer.quantize` makes of it, "
-        "which two_stage, probes and tiles use. Full keeps float32; were its diffuse part in eight "
-        "bits too, gains against it would be those of the column above.",
     )
     summed = gains(lines)
     yield Table(
@@ -113,10 +100,7 @@ def tables(
             Column("sets_megabytes", "MB", digits=1),
         ],
         [row for row in rows if "moving_gain" in row],
-        f"The eye goes around by {step:g}° a frame; tiles follow through an atlas of "
-        f"{views} views, made beforehand. Their sets, the transfer in each view's order, are made "
-        "beforehand too for the views that the path meets, or on the way, while frames go on. "
-        "Means hold the frames that a change of set, or making one, slows down.",
+        values={"step": step, "views": views},
     )
     yield _goals(scenes, lines, [row for row in rows if "moving_gain" in row])
 
@@ -136,10 +120,6 @@ def _filtering(scenes: list[dict[str, Any]], names: list[Column]) -> Table:
             Column("filtered_specular_mean", "specular, mean of levels", digits=2),
         ],
         scenes,
-        "Shares of all vertices filtered out after the last level, by masks; levels are the same. "
-        "The paper does not print its lobe's exponent (ours is 32, normalised) nor its exposure; "
-        "that few vertices leave its diffuse region does not come out here, where the albedo is "
-        "1/2 and divided by π.",
     )
 
 
@@ -170,11 +150,7 @@ def _summary(lines: list[dict[str, Any]]) -> Table:
         Column("gain_product", "against product form: median", digits=2),
         Column("gain_einsum", "against einsum: median", digits=2),
     ]
-    note = (
-        "Medians and least over the scenes. The paper names the scenes of neither figure; its "
-        "gains are against its own full computation."
-    )
-    return Table("Beside figures 1 and 9", columns, rows, note)
+    return Table("Beside figures 1 and 9", columns, rows)
 
 
 def _by_method(lines: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
@@ -249,16 +225,8 @@ def _goals(
         gain = statistics.median(line["gain"] for line in by["two_stage"])
         rows.append(("two_stage: median gain", "≥ 1.1", f"{gain:.2f}"))
     columns = [Column("goal", "goal"), Column("wanted", "wanted"), Column("got", "measured")]
-    note = (
-        "The rate is that of a product of two 1,024² matrices in the same run; full and the "
-        "product form are both counted with the latter's operations, 2·3 K(K+1) a vertex, of "
-        "which full needs fewer. Were the product form as fast as that product, gains against it "
-        "would be its share of the rate times as high. The gains that were asked for were set when "
-        "the product form was the fastest full computation known here. Where the light alone "
-        "turns, the eye product is exact, and no adaptive method is as fast."
-    )
     return Table(
-        "Goals", columns, [dict(zip(("goal", "wanted", "got"), r, strict=True)) for r in rows], note
+        "Goals", columns, [dict(zip(("goal", "wanted", "got"), r, strict=True)) for r in rows]
     )
 
 

@@ -7,8 +7,6 @@ from typing import Any
 from ..runner import Column, Context, Table, experiment
 from .columns import IN_FULL, per_method
 from .methods import (
-    HOW,
-    WHAT,
     Method,
     adaptive_way,
     baselines,
@@ -112,9 +110,7 @@ def _tables(config: Table2, rows: list[dict[str, Any]], row: Row) -> Iterator[Ta
             *per_method("fps", config.methods, "adaptive_paper"),
         ],
         frames,
-        f"{row.mesh} under {row.environment}, baked at degree {row.degree} and cut. {WHAT}{HOW}"
-        "The paper's machine is ANOTHER ONE, an Intel i7 3770 of 4 cores, and its frames hold the "
-        "drawing too; it does not name the probe.",
+        values={"row": row},
     )
     yield Table(
         "Image PSNR by degree, dB",
@@ -123,8 +119,6 @@ def _tables(config: Table2, rows: list[dict[str, Any]], row: Row) -> Iterator[Ta
             *per_method("psnr", config.methods, "psnr_paper"),
         ],
         frames,
-        "As in table 1, the background included. At degree 2 the base is degree 1, since with the "
-        "paper's base of 2 nothing would be filtered; its own figure there is finite.",
     )
     yield Table(
         "Gains by degree",
@@ -155,7 +149,6 @@ def _tables(config: Table2, rows: list[dict[str, Any]], row: Row) -> Iterator[Ta
             Column("paper", "the paper's, against its own full"),
         ],
         lines,
-        "The lowest degree from which on, up to the highest here, the method is faster.",
     )
 
 

@@ -8,9 +8,7 @@ import numpy as np
 
 from ..runner import Column, Context, Table, experiment
 from .methods import (
-    HOW,
     THRESHOLD,
-    WHAT,
     adaptive_way,
     baselines,
     color,
@@ -116,10 +114,7 @@ def _tables(config: Threshold, rows: list[dict[str, Any]], row: Row) -> Iterator
             Column("gain_einsum", "against einsum", digits=2),
         ],
         rows,
-        f"{row.mesh} under {row.environment} at degree {row.degree}. Kept: after the last level, "
-        "before refinement, of specular light (two_stage: of either). Refined: breadth-first until "
-        "nothing joins. Smoothed: over two rings, as in the paper's figure 7. Multiply-adds are of "
-        f"the products of coefficients alone. {WHAT}{HOW}",
+        values={"row": row},
     )
     limit = min(config.thresholds, key=lambda one: abs(one - THRESHOLD))
     choices = list(effects(rows, limit))
@@ -134,8 +129,7 @@ def _tables(config: Threshold, rows: list[dict[str, Any]], row: Row) -> Iterator
                 Column("judgement", "so it"),
             ],
             choices,
-            f"At the threshold {limit:g}, against the method as it is: vertices outside show the "
-            "level at which they left, no refinement, no smoothing. Less than 0.1 dB is little.",
+            values={"limit": limit},
         )
 
 

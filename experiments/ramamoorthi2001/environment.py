@@ -212,12 +212,7 @@ def _tables(rows: list[dict[str, Any]]) -> Iterator[Table]:
         "Irradiance from spherical harmonics",
         columns,
         [row for row in rows if row["window"] == "none"],
-        note="Errors of irradiance at the vertices, against the integral over all pixels of the "
-        "probe, relative to its mean over the vertices or to its value at each. The integral's "
-        f"own rounding is {rounding:.1e}. The paper's figure is its abstract's, for nine "
-        "coefficients over all normals, relative to what it does not say. PSNR: linear, exposed "
-        "so that the object's 99th percentile is 1, clipped. Negative light: ∫ max(0, -L) / ∫ L "
-        "of the truncated light itself.",
+        values={"rounding": rounding},
     )
     yield Table(
         "The same under windows",
@@ -228,8 +223,6 @@ def _tables(rows: list[dict[str, Any]]) -> Iterator[Table]:
             Column("strength", "dering's strength"),
         ],
         [row | {"mean_error_paper": None} for row in rows if row["window"] != "none"],
-        note="Dering's window is the least without negative light, or without negative "
-        "irradiance: enough for a diffuse surface, and far less.",
     )
 
 

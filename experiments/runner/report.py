@@ -6,7 +6,8 @@ import io
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -33,12 +34,43 @@ class Column:
 
 @dataclasses.dataclass(frozen=True)
 class Table:
-    """A table of all recorded rows, or of `rows`; `note` is a paragraph below it."""
+    """A table of all recorded rows, or of `rows`, and a paragraph below it.
+
+    That is `note`, or else what stands under the table's title in the Markdown file beside the
+    experiment, its ``{placeholders}`` filled from the config and from `values`.
+    """
 
     title: str
     columns: Sequence[Column]
     rows: Sequence[Row] | None = None
     note: str = ""
+    values: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+
+def with_notes(tables: Iterable[Table], path: Path, config: Any) -> list[Table]:
+    """Give each table without a note the paragraph of its title in the Markdown file at `path`.
+
+    A placeholder may also name a paragraph of ``notes.md`` in the same folder.
+    """
+    own, shared = sections(path), sections(path.with_name("notes.md"))
+    filled = []
+    for table in tables:
+        note = table.note
+        if not note and table.title in own:
+            values = {"config": config, **table.values}
+            common = {name: text.format(**values) for name, text in shared.items()}
+            note = own[table.title].format(**common | values)
+        filled.append(dataclasses.replace(table, note=note))
+    return filled
+
+
+def sections(path: Path) -> dict[str, str]:
+    """The text under each ``## title`` of a file, as one line; none where there is no file."""
+    if not path.exists():
+        return {}
+    _, *parts = re.split(r"^## ", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    halves = (part.partition("\n") for part in parts)
+    return {title.strip(): " ".join(text.split()) for title, _, text in halves}
 
 
 def write(path: Path, text: str) -> None:

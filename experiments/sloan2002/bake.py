@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import math
 import sys
 import time
 import warnings
@@ -37,12 +38,12 @@ class _Recorder:
         self._kept: list[tuple[np.ndarray, np.ndarray]] = []
         self._cast: list[int] = []
 
-    def occluded(self, origins, directions):
+    def occluded(self, origins, directions, max_distance=math.inf):
         # An odd stride: the bake's calls alternate between two kinds.
         if next(self._calls) % 15 == 0:
             self._kept.append((origins, directions))
         self._cast.append(len(origins))  # a list, since calls come from several threads
-        return self._scene.occluded(origins, directions)
+        return self._scene.occluded(origins, directions, max_distance)
 
     def closest_hit(self, origins, directions):
         return self._scene.closest_hit(origins, directions)

@@ -219,17 +219,7 @@ def _goals(config: FirstLight, first: dict[str, Any]) -> Table:
         Column("limit", "at most", digits=1),
         Column("measured", "measured", digits=2),
     ]
-    note = (
-        f"On {first['mesh']}, {first['vertices']:,} vertices, degree {max(config.degrees)}, "
-        f"{config.directions:,} directions. The limits were set for armadillo's 49,990 at degree "
-        "10 and 2,048. The transfer's error is of all coefficients together at "
-        f"{first['chosen']:,} vertices, against {config.transfer_directions:,} directions in two "
-        f"turned sets, whose mean is itself known to {first['transfer_reference_error']:.2f} %. "
-        "Its rays alone: one in fifteen of the bake's calls for rays, cast again with nothing "
-        "else to do and scaled to all. Memory is what the process has held until the end of its "
-        "first bake, Python and JAX included."
-    )
-    return Table("Goals", columns, rows, note)
+    return Table("Goals", columns, rows, values={"first": first, "degree": max(config.degrees)})
 
 
 def _by_degree(config: FirstLight, errors: list[dict[str, Any]]) -> Table:
@@ -246,18 +236,7 @@ def _by_degree(config: FirstLight, errors: list[dict[str, Any]]) -> Table:
         Column("reference", "reference's own, %", digits=2),
         *(Column(f"psnr {d}", f"degree {d}: PSNR, dB", digits=1) for d in config.degrees),
     ]
-    note = (
-        "Relative RMS error of RGB irradiance, each variant against its own reference at "
-        f"{config.vertices:,} vertices drawn once per mesh. The reference of direct light sums "
-        "over all pixels of the probe, two directions in each, drawn uniformly, with visibility "
-        "from rays offset as the bake's are. That of the bounce adds light along "
-        f"2 × {config.paths:,} random paths per vertex; where one meets the mesh, the normal is "
-        "interpolated, and one direction is drawn by the probe's flux. Its own error is told by "
-        "two independent halves: half of their difference. PSNR is over the same vertices, linear, "
-        "exposed so that the 99th percentile of the object's pixels, shadowed at the highest "
-        "degree, is 1, and clipped."
-    )
-    return Table("Irradiance by degree", columns, list(rows.values()), note)
+    return Table("Irradiance by degree", columns, list(rows.values()))
 
 
 def _worth(config: FirstLight, errors: list[dict[str, Any]]) -> Table:
@@ -277,8 +256,12 @@ def _worth(config: FirstLight, errors: list[dict[str, Any]]) -> Table:
         Column("shadowed to one bounce", "shadowed against one bounce, %", digits=1),
         Column("one bounce to one bounce", "one bounce against one bounce, %", digits=1),
     ]
-    note = f"As above, at degree {max(config.degrees)}: variants against references that hold more."
-    return Table("What shadows and a bounce are worth", columns, list(rows.values()), note)
+    return Table(
+        "What shadows and a bounce are worth",
+        columns,
+        list(rows.values()),
+        values={"degree": max(config.degrees)},
+    )
 
 
 def _times(config: FirstLight, context: Context, bakes: list[dict[str, Any]]) -> Table:
@@ -306,11 +289,13 @@ def _times(config: FirstLight, context: Context, bakes: list[dict[str, Any]]) ->
         Column("raster", "raster, s", digits=2),
         Column("reference", "reference, s", digits=1),
     ]
-    note = (
-        f"Projecting a probe to degree {max(config.degrees)} takes "
-        f"{1e3 * statistics.median(projections):.2f} ms. Shade: all vertices under one light at "
-        "that degree. Read: the largest of the coefficients, by XLA. Raster: "
-        f"{config.samples}² rays to a pixel of {round(_WIDTH * config.size)} × {config.size}. "
-        "Reference: both halves, direct and bounced, of all environments."
+    return Table(
+        "Times",
+        columns,
+        rows,
+        values={
+            "degree": max(config.degrees),
+            "projecting_ms": 1000.0 * statistics.median(projections),
+            "width": round(_WIDTH * config.size),
+        },
     )
-    return Table("Times", columns, rows, note)

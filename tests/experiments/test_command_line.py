@@ -1,5 +1,7 @@
 """The command line: listing, refusals in one sentence, overrides, exit codes."""
 
+import dataclasses
+import string
 import subprocess
 import sys
 import time
@@ -53,6 +55,21 @@ def test_every_experiment_is_registered_and_its_presets_fill():
         assert set(entry.presets) >= {"quick", "paper"}
         for preset, values in entry.presets.items():
             fill(load(entry).config, values, where=preset)
+
+
+def test_notes_belong_to_tables_and_name_fields_of_the_config():
+    from experiments.runner.report import sections
+
+    for entry in entries().values():
+        notes = sections(entry.path.with_suffix(".md"))
+        code = "".join(path.read_text() for path in entry.path.parent.glob("*.py"))
+        for title, text in notes.items():
+            assert f'"{title}"' in code or f"'{title}'" in code, (entry.file, title)
+            for _, field, _, _ in string.Formatter().parse(text):
+                if (field or "").startswith("config."):
+                    name = field.removeprefix("config.").partition("[")[0]
+                    fields = {one.name for one in dataclasses.fields(load(entry).config)}
+                    assert name in fields, (entry.file, name)
 
 
 @pytest.mark.parametrize("words", [[], ["--help"], ["run", "--help"]])
