@@ -18,7 +18,6 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsh import harmonics, sky, sphere
-from jaxsh.sky._azimuth import half_rows
 
 from ..runner import Column, Context, Table, experiment
 from .numpy_twin import polynomial, projection
@@ -186,7 +185,7 @@ def _plain_fit() -> tuple[sky.SkyFit, sky.SkyFit]:
             np.linalg.pinv(polynomials(axis, values, count))
             for axis, values, count in zip((ZENITH, TURBIDITY), nodes, PLAIN, strict=True)
         ]
-    half = samples[..., half_rows(_DEGREE)]
+    half = samples[..., harmonics.orders(_DEGREE) >= 0]
     values = np.einsum("in,jm,nmcr->crij", *along, half, optimize=True)
 
     def fit() -> sky.SkyFit:

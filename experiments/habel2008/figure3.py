@@ -17,9 +17,6 @@ from jaxtyping import Float
 from scipy.interpolate import make_interp_spline
 
 from jaxsh import harmonics, sky
-from jaxsh.sky._chebyshev import Axis
-from jaxsh.sky._error import Reading
-from jaxsh.sky._habel import evaluate_monomials
 
 from ..runner import Column, Context, Data, Table, experiment
 from .plots import draw
@@ -36,7 +33,7 @@ from .suns import (
     scaled,
 )
 
-_READINGS: tuple[Reading, ...] = get_args(Reading)
+_READINGS: tuple[sky.Reading, ...] = get_args(sky.Reading)
 _STORED_BANDS = 7  # of the paper's tables and of those that the package comes with
 
 
@@ -89,7 +86,7 @@ def figure3(config: Figure3, context: Context) -> list[Table]:
     return list(_tables(config, context.rows))
 
 
-def smallest(suns: Suns, reading: Reading) -> Float[np.ndarray, "h t 3"]:
+def smallest(suns: Suns, reading: sky.Reading) -> Float[np.ndarray, "h t 3"]:
     """L_min, infinite for channels that turn negative somewhere: they cannot be divided by it."""
     low = np.asarray(sky.smallest_luminance(suns.directions, suns.turbidity[None], reading=reading))
     return np.where((low > 0).all(axis=(0, 1)), low, np.inf)
@@ -106,7 +103,7 @@ def _published(data: Data, suns: Suns) -> Iterator[Model]:
     if table is None:
         return
     theta, turbidity = np.meshgrid(suns.theta, suns.turbidity, indexing="ij")
-    values = evaluate_monomials(table, theta.ravel(), turbidity.ravel())
+    values = sky.habel2008_evaluate(table, theta.ravel(), turbidity.ravel())
     values = values.reshape(*theta.shape, 3, -1)
     yield Model("the authors' tables", "published", 112, values, True)
     # With the sun at azimuth 0 nearly half of the weights are zero by symmetry; theirs are not.
@@ -173,14 +170,14 @@ def _separable(samples, along_theta, along_turbidity):
     return np.einsum("hn,tm,nmck->htck", along_theta, along_turbidity, samples, optimize=True)
 
 
-def fourier(axis: Axis, values, count: int, period: int = 1) -> Float[np.ndarray, "n c"]:
+def fourier(axis: sky.Axis, values, count: int, period: int = 1) -> Float[np.ndarray, "n c"]:
     """1, cos πx, sin πx, cos 2πx, … for x in [-1, 1]: the range is the period, or a part of it."""
     x, n = scaled(axis, values)[:, None] * np.pi / period, np.arange(count)
     k = (n + 1) // 2
     return np.where((n % 2 == 1) | (n == 0), np.cos(k * x), np.sin(k * x))
 
 
-def cosines(axis: Axis, values, count: int) -> Float[np.ndarray, "n c"]:
+def cosines(axis: sky.Axis, values, count: int) -> Float[np.ndarray, "n c"]:
     """The discrete cosine basis of Dobashi et al. 1995: the range mirrored, so without a jump."""
     return np.cos(np.pi * np.arange(count) * (scaled(axis, values)[:, None] + 1) / 2)
 

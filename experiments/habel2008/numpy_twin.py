@@ -6,20 +6,18 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxsh import harmonics, sky
-from jaxsh.sky._azimuth import half_rows, row_of_each
-from jaxsh.sky._colour import xyz_to_srgb
-from jaxsh.sky._preetham_constants import preetham_constants
 
 Angles = Float[np.ndarray, " n"]
 
 
 def polynomial(fit: sky.SkyFit) -> Callable[[Angles, Angles, Angles], np.ndarray]:
     """Eqs. 1 and 4 in float64: f(θ, φ, τ) -> (n, 3, K), one matrix product and the rotation."""
-    table = sky.habel2008_monomials(fit)[half_rows(fit.degree)]
+    l, m = harmonics.degrees(fit.degree), harmonics.orders(fit.degree)
+    table = sky.habel2008_monomials(fit)[m >= 0]
     rows, i, j, channels = table.shape
     matrix = np.ascontiguousarray(table.transpose(1, 2, 3, 0).reshape(i * j, channels * rows))
-    powers, m = (np.arange(i), np.arange(j)), harmonics.orders(fit.degree)
-    places, cosine = row_of_each(fit.degree), m >= 0
+    powers = np.arange(i), np.arange(j)
+    places, cosine = l * (l + 1) // 2 + np.abs(m), m >= 0
 
     def evaluate(theta: Angles, phi: Angles, turbidity: Angles) -> np.ndarray:
         terms = (theta[:, None] ** powers[0])[:, :, None] * (turbidity[:, None] ** powers[1])[
@@ -39,7 +37,7 @@ def projection(
     """Σ of samples, f(sun, τ) -> (3, K) in float64; the harmonics are tabulated beforehand."""
     basis = weight * np.asarray(harmonics.evaluate(views, degree), np.float64)
     cosine = views[:, 2].astype(np.float64)
-    table, matrix = preetham_constants("paper"), xyz_to_srgb().T
+    table, matrix = sky.preetham_constants("paper"), sky.xyz_to_srgb().T
 
     def relative(coefficients, sun, turbidity, gamma):
         a, b, c, d, e = (slope * turbidity + intercept for slope, intercept in coefficients)

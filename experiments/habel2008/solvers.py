@@ -18,8 +18,6 @@ import optimistix as optx
 from jaxtyping import Array, Float
 
 from jaxsh import harmonics, sky
-from jaxsh.sky._chebyshev import Axis
-from jaxsh.sky._solve import least_squares, message
 
 from ..runner import Column, Context, Table, experiment
 from .suns import PLAIN, TURBIDITY, ZENITH, Columns, Suns, polynomials, project, scaled
@@ -114,11 +112,11 @@ def _problem(config: Solvers) -> Problem:
     return Problem(nodes, samples.T, suns, exact, low.reshape(-1, 3))
 
 
-def _monomials(axis: Axis, values: Float[np.ndarray, " n"], count: int):
+def _monomials(axis: sky.Axis, values: Float[np.ndarray, " n"], count: int):
     return np.power.outer(values, np.arange(count))
 
 
-def _scaled_monomials(axis: Axis, values: Float[np.ndarray, " n"], count: int):
+def _scaled_monomials(axis: sky.Axis, values: Float[np.ndarray, " n"], count: int):
     return np.power.outer(scaled(axis, values), np.arange(count))
 
 
@@ -151,10 +149,10 @@ Solve = Callable[[Array, Array, int], Outcome]
 
 def _ours(solver: Literal["qr", "gauss-newton", "levenberg-marquardt"]) -> Solve:
     def solve(design: Array, targets: Array, max_steps: int) -> Outcome:
-        values, solution = least_squares(
+        values, solution = sky.least_squares(
             design, targets, jnp.ones_like(targets), solver=solver, max_steps=max_steps
         )
-        return Outcome(np.asarray(values), int(solution.steps), _first(message(solution)))
+        return Outcome(np.asarray(values), int(solution.steps), _first(solution.message))
 
     return solve
 

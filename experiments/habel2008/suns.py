@@ -8,19 +8,18 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxsh import harmonics, sky
-from jaxsh.sky._chebyshev import Axis
 
 from ..runner import Data
 
-ZENITH = Axis("θ", 0.0, np.pi / 2)
-TURBIDITY = Axis("turbidity", 2.5, 6.0)
+ZENITH = sky.Axis("θ", 0.0, np.pi / 2)
+TURBIDITY = sky.Axis("turbidity", 2.5, 6.0)
 PLAIN = 14, 8  # the paper's degrees, 13 and 7, as numbers of polynomials
 
 # Upper bounds on E_mean by bands, in percent: "drops below 1.5% for 7 bands, introducing
 # virtually no error (< 0.005%) up to 5 bands" (section 3.2).
 CLAIM = {**dict.fromkeys(range(1, 6), 0.005), 7: 1.5}
 
-Columns = Callable[[Axis, Float[np.ndarray, " n"], int], Float[np.ndarray, "n c"]]
+Columns = Callable[[sky.Axis, Float[np.ndarray, " n"], int], Float[np.ndarray, "n c"]]
 
 
 class Suns(NamedTuple):
@@ -65,13 +64,13 @@ def project(grids: Sequence[Suns], bands: int) -> list[Float[np.ndarray, "h t 3 
     return [part.reshape(*size, 3, -1) for part, size in zip(parts, sizes, strict=True)]
 
 
-def scaled(axis: Axis, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+def scaled(axis: sky.Axis, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """From the axis' range to [-1, 1]."""
     return np.asarray(axis.scaled(jnp.asarray(values)))
 
 
 def polynomials(
-    axis: Axis, values: Float[np.ndarray, " n"], count: int
+    axis: sky.Axis, values: Float[np.ndarray, " n"], count: int
 ) -> Float[np.ndarray, "n c"]:
     """Chebyshev polynomials of one variable on its range: the best basis for any polynomial."""
     return np.polynomial.chebyshev.chebvander(scaled(axis, values), count - 1)

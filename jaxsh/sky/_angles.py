@@ -1,11 +1,13 @@
-"""The angles that sky models speak of, from directions, with derivatives that stay finite."""
+"""Angles of sky and sun from directions, with derivatives that stay finite."""
 
 from typing import NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, as_float
+from ..harmonics import degrees, orders
 
 
 class Angles(NamedTuple):
@@ -56,3 +58,57 @@ def length(*components: Float[Array, "..."]) -> Float[Array, "..."]:
     squared = sum(c * c for c in components)
     positive = squared > 0
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1)), 0)
+
+
+def zenith_angle(
+    x: Float[Array, " n"], y: Float[Array, " n"], z: Float[Array, " n"]
+) -> Float[Array, " n"]:
+    """θ of a unit vector. A cone point at the zenith, where the derivative is set to zero."""
+    return jnp.atan2(length(x, y), z)
+
+
+def squared_zenith_angle(
+    x: Float[Array, " n"], y: Float[Array, " n"], z: Float[Array, " n"]
+) -> Float[Array, " n"]:
+    """θ² of a unit vector: smooth at the zenith, where θ is not."""
+    squared = x * x + y * y
+    near = (squared < 1e-5) & (z > 0)
+    # arcsin² r; the first term left out, 4r⁸/35, is below float64's rounding here.
+    series = squared * (1 + squared * (1 / 3 + squared * (8 / 45)))
+    theta = jnp.atan2(jnp.sqrt(jnp.where(near, 1, squared)), z)
+    return jnp.where(near, series, theta * theta)
+
+
+def waves(
+    x: Float[Array, " n"], y: Float[Array, " n"], degree: int, *, smooth: bool
+) -> Float[Array, "k n"]:
+    """What turns coefficients from azimuth 0 to the sun's: cos mφ for m ≥ 0, sin |m|φ for m < 0.
+
+    Habel et al. 2008, eq. 4, for a sky that is its own mirror image in the sun's meridian, so
+    that all weights with m < 0 are zero at azimuth 0. `smooth` leaves the factor sin^|m| θ in:
+    then these are the real and imaginary parts of (x + iy)^|m|, polynomials. Without it they have
+    no limit at the zenith, which is given the azimuth 0.
+    """
+    if not smooth:
+        radius = length(x, y)
+        aside = radius > 0
+        safe = jnp.where(aside, radius, 1)
+        x, y = jnp.where(aside, x / safe, 1), y / safe
+    rows = [(jnp.ones_like(x), jnp.zeros_like(x))]
+    for _ in range(degree):
+        real, imaginary = rows[-1]
+        rows.append((real * x - imaginary * y, real * y + imaginary * x))
+    sines = [imaginary for _, imaginary in rows[:0:-1]]
+    table = jnp.stack(sines + [real for real, _ in rows])
+    return table[orders(degree) + degree]
+
+
+def half_rows(degree: int) -> np.ndarray:
+    """Indices l(l+1) + m of the coefficients with m ≥ 0, in their order."""
+    return np.flatnonzero(orders(degree) >= 0).astype(np.int32)
+
+
+def row_of_each(degree: int) -> np.ndarray:
+    """For each of the K coefficients the place of (l, |m|) among `half_rows`."""
+    l, m = degrees(degree), orders(degree)
+    return l * (l + 1) // 2 + np.abs(m)

@@ -11,7 +11,7 @@ from .._core.checks import align, as_float
 from .._core.linalg import matmul
 from ..sphere import reconstruct
 from ._angles import directions, parameter
-from ._colour import xyz_to_srgb
+from ._color import xyz_to_srgb
 from ._preetham import preetham_radiance
 from ._project import project_preetham
 

@@ -11,11 +11,10 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import check_degree
 from .._core.linalg import einsum, matmul
 from ..harmonics import orders
-from ._azimuth import half_rows
-from ._chebyshev import Axis, monomials
+from ._angles import half_rows
 from ._project import Model, project
-from ._sky_fit import Prefactor, SkyFit, design
-from ._solve import Solution, Solver, least_squares, message
+from ._sky_fit import Axis, Prefactor, SkyFit, design, monomials
+from ._solve import Solution, Solver, least_squares
 
 
 def fit(
@@ -97,7 +96,7 @@ def fit(
     if throw and not solution.converged:
         raise RuntimeError(
             f"the solver did not converge in {int(solution.steps)} steps, residual "
-            f"{float(solution.residual):.1e}: {message(solution)}"
+            f"{float(solution.residual):.1e}: {solution.message}"
         )
     coefficients = values.reshape(channels, len(rows), *terms)
     return SkyFit(coefficients, mix, axes, parity, prefactor, solution)

@@ -3,6 +3,7 @@
 import importlib.util
 import math
 import pathlib
+import struct
 
 import jax
 import jax.numpy as jnp
@@ -13,13 +14,16 @@ from .._core.checks import align, check_batches
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
 from ._angles import angles, directions, parameter
-from ._tensor_file import read_tensors
 from ._validity import Check, check_option, check_range, check_sun
 
 # The tables hold the spectrum's integral with the colour matching: kcd/m² are 0.683 of it.
 _KILOLUMENS_PER_WATT = 0.683
 
 _FILE = pathlib.Path("data", "sunsky", "sunsky_datasets.bin")
+
+# Mitsuba's container of named arrays, all of it little-endian.
+_MAGIC = b"tensor_file\x00\x01\x00"
+_DTYPES = dict(enumerate(("i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8"), 1))
 
 
 def hosek_radiance(
@@ -67,8 +71,8 @@ def _radiance(view, sun, turbidity, albedo, tables):
     geometry = angles(view, sun)
     parts = _interpolated(tables, geometry.theta_sun, turbidity[..., 0], albedo[..., 0])
     channels = [_channel(part, geometry) for part in parts]
-    colour = _KILOLUMENS_PER_WATT * jnp.stack(jnp.broadcast_arrays(*channels), axis=-1)
-    return jnp.where((geometry.cos_view >= 0)[..., None], colour, 0)
+    color = _KILOLUMENS_PER_WATT * jnp.stack(jnp.broadcast_arrays(*channels), axis=-1)
+    return jnp.where((geometry.cos_view >= 0)[..., None], color, 0)
 
 
 def _channel(parts, geometry):
@@ -124,3 +128,31 @@ def _table_path() -> pathlib.Path:
         "hosek_radiance reads its tables from the mitsuba package: `pip install mitsuba` "
         f"brings them in {_FILE.as_posix()}"
     )
+
+
+def read_tensors(path: pathlib.Path) -> dict[str, np.ndarray]:
+    """Arrays by name. Raises `ValueError` that names the file where it is not one or is damaged."""
+    data = path.read_bytes()
+    if not data.startswith(_MAGIC):
+        raise ValueError(f"{path}: not a tensor file of version 1.0")
+    try:
+        return _read(data)
+    except (struct.error, ValueError, KeyError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: damaged tensor file ({error})") from error
+
+
+def _read(data: bytes) -> dict[str, np.ndarray]:
+    """A count, then for each: length and name, rank, type, offset, extents."""
+    (count,), at = struct.unpack_from("<I", data, len(_MAGIC)), len(_MAGIC) + 4
+    tensors = {}
+    for _ in range(count):
+        (length,) = struct.unpack_from("<H", data, at)
+        name = data[at + 2 : at + 2 + length].decode()
+        at += 2 + length
+        rank, kind, offset = struct.unpack_from("<HBQ", data, at)
+        shape = struct.unpack_from(f"<{rank}Q", data, at + 11)
+        at += 11 + 8 * rank
+        dtype = np.dtype("<" + _DTYPES[kind])
+        flat = np.frombuffer(data, dtype, int(np.prod(shape)), offset)
+        tensors[name] = flat.reshape(shape)
+    return tensors

@@ -1,8 +1,9 @@
 """A fitted sky: coefficients as a closed form of the sun and the sky's parameters."""
 
+import functools
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -12,11 +13,47 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, check_batches, check_degree, is_concrete
 from .._core.linalg import einsum, matmul
-from ._angles import directions, parameter, unit
-from ._azimuth import row_of_each, squared_zenith_angle, waves, zenith_angle
-from ._chebyshev import Axis, chebyshev, tensor
+from ._angles import (
+    directions,
+    parameter,
+    row_of_each,
+    squared_zenith_angle,
+    unit,
+    waves,
+    zenith_angle,
+)
 
 Prefactor = Callable[..., Array]
+
+
+class Axis(NamedTuple):
+    """One variable of a fit: its name, its range, and the scale that it is fitted in."""
+
+    name: str
+    low: float
+    high: float
+    log: bool = False
+
+    def scaled(self, value: Float[Array, " n"]) -> Float[Array, " n"]:
+        """From the range to [-1, 1]. Differentiable."""
+        low, high = self._ends()
+        bent = jnp.log(value) if self.log else value
+        return (2 * bent - (low + high)) / (high - low)
+
+    def nodes(self, count: int) -> Float[np.ndarray, " n"]:
+        """The roots of T_count in the scaled variable, back in the range, ascending."""
+        low, high = self._ends()
+        root = -np.cos(np.pi * (np.arange(count) + 0.5) / count)
+        bent = low + (root + 1) * (high - low) / 2
+        return np.exp(bent) if self.log else bent
+
+    def holds(self, value):
+        """Whether values are in the range, but for rounding; NumPy or JAX."""
+        slack = 1e-6 * (self.high - self.low)
+        return (value >= self.low - slack) & (value <= self.high + slack)
+
+    def _ends(self) -> tuple[float, float]:
+        return (math.log(self.low), math.log(self.high)) if self.log else (self.low, self.high)
 
 
 class SkyFit(eqx.Module):
@@ -61,8 +98,8 @@ class SkyFit(eqx.Module):
             axis.name: (*value.shape, 1) for axis, value in zip(self.axes[1:], numbers, strict=True)
         }
         check_batches(sun=sun.shape, **shapes)
-        self._check_range(sun, numbers)
-        return _evaluate(self, sun, numbers)
+        check_range(self.axes, self.parity, sun, numbers)
+        return evaluate(self, sun, numbers)
 
     @property
     def degree(self) -> int:
@@ -76,30 +113,32 @@ class SkyFit(eqx.Module):
         rows = (degree + 1) * (degree + 2) // 2
         return eqx.tree_at(lambda f: f.coefficients, self, self.coefficients[:, :rows])
 
-    def _check_range(self, sun, numbers):
-        if is_concrete(sun):
-            x, y, z = np.moveaxis(np.asarray(sun, np.float64), -1, 0)
-            theta = np.arctan2(np.hypot(x, y), z)
-            bad = ~self.axes[0].holds(theta**2 if self.parity else theta)
+
+def check_range(axes: tuple[Axis, ...], parity: bool, sun, numbers) -> None:
+    """Raises `ValueError` for known values outside of the range that a fit holds in."""
+    if is_concrete(sun):
+        x, y, z = np.moveaxis(np.asarray(sun, np.float64), -1, 0)
+        theta = np.arctan2(np.hypot(x, y), z)
+        bad = ~axes[0].holds(theta**2 if parity else theta)
+        if bad.any():
+            high = np.sqrt(axes[0].high) if parity else axes[0].high
+            raise ValueError(
+                f"fitted for suns up to {np.degrees(high):g} degrees from the zenith, got "
+                f"{np.degrees(theta[bad].flat[0]):g}"
+            )
+    for axis, value in zip(axes[1:], numbers, strict=True):
+        if is_concrete(value):
+            array = np.asarray(value)
+            bad = ~axis.holds(array)
             if bad.any():
-                high = np.sqrt(self.axes[0].high) if self.parity else self.axes[0].high
                 raise ValueError(
-                    f"fitted for suns up to {np.degrees(high):g} degrees from the zenith, got "
-                    f"{np.degrees(theta[bad].flat[0]):g}"
+                    f"fitted for {axis.name} in [{axis.low:g}, {axis.high:g}], got "
+                    f"{array[bad].flat[0]:g}"
                 )
-        for axis, value in zip(self.axes[1:], numbers, strict=True):
-            if is_concrete(value):
-                array = np.asarray(value)
-                bad = ~axis.holds(array)
-                if bad.any():
-                    raise ValueError(
-                        f"fitted for {axis.name} in [{axis.low:g}, {axis.high:g}], got "
-                        f"{array[bad].flat[0]:g}"
-                    )
 
 
 @jax.jit
-def _evaluate(fit: SkyFit, sun, parameters):
+def evaluate(fit: SkyFit, sun, parameters):
     batch = jnp.broadcast_shapes(sun.shape[:-1], *(p.shape for p in parameters))
     suns = _rows(unit(sun), (*batch, 3)).reshape(math.prod(batch), 3)
     numbers = [_rows(p, batch).ravel() for p in parameters]
@@ -132,3 +171,26 @@ def design(axes, variables, terms) -> Float[Array, "terms n"]:
 
 def _rows(array, shape):
     return jnp.broadcast_to(align(array, jnp.zeros(shape))[0], shape)
+
+
+def chebyshev(x: Float[Array, " n"], count: int) -> Float[Array, "count n"]:
+    """T_0 to T_(count-1) in rows, by the three-term recursion. Differentiable."""
+    rows = [jnp.ones_like(x), x]
+    while len(rows) < count:
+        rows.append(2 * x * rows[-1] - rows[-2])
+    return jnp.stack(rows[:count])
+
+
+def monomials(x: Float[Array, " n"], count: int) -> Float[Array, "count n"]:
+    """1, x, … x^(count-1) in rows: the paper's basis. Differentiable."""
+    rows = [jnp.ones_like(x)]
+    while len(rows) < count:
+        rows.append(rows[-1] * x)
+    return jnp.stack(rows)
+
+
+def tensor(rows: Sequence[Float[Array, "_ n"]]) -> Float[Array, "terms n"]:
+    """All products of one row of each, the last varying fastest."""
+    return functools.reduce(
+        lambda a, b: (a[:, None] * b[None]).reshape(len(a) * len(b), a.shape[-1]), rows
+    )

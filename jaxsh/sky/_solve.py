@@ -1,17 +1,19 @@
-"""Many linear least-squares problems with one design, by the solvers that nonlinear ones take."""
+"""Many linear least-squares problems with one design, by the solvers that nonlinear ones take.
+
+Optimistix and lineax are imported where a problem is solved: the stored fits need neither.
+"""
 
 from typing import Any, Literal, get_args
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import lineax as lx
-import optimistix as optx
 from jaxtyping import Array, Float, Int
 
 from .._core.linalg import matmul
 
-Solver = Literal["gauss-newton", "levenberg-marquardt", "qr"] | optx.AbstractLeastSquaresSolver
+_Named = Literal["gauss-newton", "levenberg-marquardt", "qr"]
+Solver = _Named | Any  # or an `optimistix.AbstractLeastSquaresSolver`
 
 
 class Solution(eqx.Module):
@@ -27,7 +29,17 @@ class Solution(eqx.Module):
 
     @property
     def converged(self) -> bool:
+        """Whether the solver says so for every problem."""
+        import optimistix as optx
+
         return bool(self.result == optx.RESULTS.successful)
+
+    @property
+    def message(self) -> str:
+        """The result code in words."""
+        import optimistix as optx
+
+        return optx.RESULTS[self.result] or "successful"
 
 
 def least_squares(
@@ -44,6 +56,8 @@ def least_squares(
     `"levenberg-marquardt"` with a lineax QR and a tolerance of √ε, or `"qr"`, the linear solution
     in one step, to check the others by. Does not raise where a solver fails: see `Solution`.
     """
+    import optimistix as optx
+
     values, steps, results = _solve(
         design, targets, scales, _named(solver, design.dtype), max_steps
     )
@@ -55,11 +69,10 @@ def least_squares(
     return values, Solution(residual, steps[worst], result)
 
 
-def message(solution: Solution) -> str:
-    return optx.RESULTS[solution.result] or "successful"
-
-
 def _named(solver: Solver, dtype):
+    import lineax as lx
+    import optimistix as optx
+
     tolerance = float(jnp.finfo(dtype).eps) ** 0.5
     match solver:
         case "gauss-newton":
@@ -68,12 +81,15 @@ def _named(solver: Solver, dtype):
             return optx.LevenbergMarquardt(tolerance, tolerance, linear_solver=lx.QR())
         case "qr" | optx.AbstractLeastSquaresSolver():
             return solver
-    names = ", ".join(get_args(get_args(Solver)[0]))
+    names = ", ".join(get_args(_Named))
     raise ValueError(f"solver must be one of {names} or of Optimistix, got {solver!r}")
 
 
 @eqx.filter_jit
 def _solve(design, targets, scales, solver, max_steps):
+    import lineax as lx
+    import optimistix as optx
+
     def linear(target, scale):
         operator = lx.MatrixLinearOperator(scale[:, None] * design)
         solution = lx.linear_solve(operator, target, lx.QR(), throw=False)

@@ -9,7 +9,7 @@ import pytest
 from suns import sun_at, upper_directions
 
 from jaxsh import harmonics, sky
-from jaxsh.sky import _chebyshev, _fit, _solve
+from jaxsh.sky import _fit, _sky_fit
 
 DEGREE = 3
 OPTIONS = {"degree": DEGREE, "terms": (7, 3), "log": ["haze"]}
@@ -70,10 +70,10 @@ def test_solvers_agree(rng):
     ]
     arrays = [jnp.asarray(a) for a in (design, targets, scales)]
     for solver in ("gauss-newton", "qr", optx.LevenbergMarquardt(1e-9, 1e-9)):
-        values, solution = _solve.least_squares(*arrays, solver=solver)
+        values, solution = sky.least_squares(*arrays, solver=solver)
         np.testing.assert_allclose(values, expected, 1e-6, 1e-9)
         assert solution.converged
-        assert _solve.message(solution) == "successful"
+        assert solution.message == "successful"
     residual = np.linalg.norm(scales * (np.asarray(values) @ design.T) - targets)
     np.testing.assert_allclose(solution.residual, residual / np.linalg.norm(targets))
 
@@ -264,14 +264,14 @@ def test_bad_calls(fitted, unchecked):
 
 def test_the_basis():
     x = np.linspace(-1, 1, 9)
-    rows = _chebyshev.chebyshev(jnp.asarray(x), 6)
+    rows = _sky_fit.chebyshev(jnp.asarray(x), 6)
     np.testing.assert_allclose(rows, np.polynomial.chebyshev.chebvander(x, 5).T, 0, 1e-15)
-    assert _chebyshev.chebyshev(jnp.asarray(x), 1).shape == (1, 9)
-    np.testing.assert_allclose(_chebyshev.monomials(jnp.asarray(x), 4), np.vander(x, 4).T[::-1])
-    axis = _chebyshev.Axis("haze", 1.0, 3.0, log=True)
+    assert _sky_fit.chebyshev(jnp.asarray(x), 1).shape == (1, 9)
+    np.testing.assert_allclose(_sky_fit.monomials(jnp.asarray(x), 4), np.vander(x, 4).T[::-1])
+    axis = sky.Axis("haze", 1.0, 3.0, log=True)
     nodes = axis.nodes(5)
     np.testing.assert_allclose(
-        _chebyshev.chebyshev(axis.scaled(jnp.asarray(nodes)), 6)[5], 0, 0, 1e-14
+        _sky_fit.chebyshev(axis.scaled(jnp.asarray(nodes)), 6)[5], 0, 0, 1e-14
     )
     assert (np.diff(nodes) > 0).all()
 
@@ -279,13 +279,12 @@ def test_the_basis():
 def test_why_chebyshev():
     """The condition of the paper's basis at degree (13, 7), and ours."""
     height, turbidity = (
-        _chebyshev.Axis("θ", 0.0, np.pi / 2),
-        _chebyshev.Axis("turbidity", 2.5, 6.0),
+        sky.Axis("θ", 0.0, np.pi / 2),
+        sky.Axis("turbidity", 2.5, 6.0),
     )
     nodes = np.meshgrid(height.nodes(28), turbidity.nodes(16), indexing="ij")
     theta, tau = (jnp.asarray(a.ravel()) for a in nodes)
-    raw = _chebyshev.tensor([_chebyshev.monomials(theta, 14), _chebyshev.monomials(tau, 8)])
+    raw = _sky_fit.tensor([_sky_fit.monomials(theta, 14), _sky_fit.monomials(tau, 8)])
     good = _fit.design((height, turbidity), (theta, tau), (14, 8))
-    assert _chebyshev.condition(raw.T) > 1e15
-    assert _chebyshev.condition(good.T) < 2.1
-    assert _chebyshev.condition(jnp.zeros((3, 2))) == np.inf
+    assert np.linalg.cond(raw.T) > 1e15
+    assert np.linalg.cond(good.T) < 2.1

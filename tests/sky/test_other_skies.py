@@ -13,7 +13,7 @@ from suns import sun_at, upper_directions
 
 from jaxsh import harmonics, sky
 from jaxsh.sky import _hosek
-from jaxsh.sky._tensor_file import read_tensors
+from jaxsh.sky._hosek import read_tensors
 
 
 @pytest.mark.parametrize("kind", range(1, 16))

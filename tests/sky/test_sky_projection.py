@@ -11,7 +11,7 @@ from suns import sun_at, upper_directions
 
 from jaxsh import harmonics, sky
 from jaxsh.sky import _project as room
-from jaxsh.sky._quadrature import sky_grid, tanh_sinh
+from jaxsh.sky._project import sky_grid, tanh_sinh
 
 ELEVATIONS = np.array([90, 89.9, 60, 30, 10, 1, 0.05, 1e-3, 0])
 TURBIDITIES = np.array([1.7, 2.5, 6.0, 10.0])

@@ -10,8 +10,15 @@ from second_derivation import attenuated_sun, xyz_to_srgb
 from suns import sun_at
 
 from jaxsh import harmonics, sky
-from jaxsh.sky._solar_tables import OZONE, SOLAR_RADIANCE, WATER, WAVELENGTHS, colour_matching
-from jaxsh.sky._sun import disc_lambdas, optical_mass
+from jaxsh.sky._sun import (
+    OZONE,
+    SOLAR_RADIANCE,
+    WATER,
+    WAVELENGTHS,
+    color_matching,
+    disc_lambdas,
+    optical_mass,
+)
 
 SOLID_ANGLE = 4 * math.pi * math.sin(sky.SUN_RADIUS / 2) ** 2
 
@@ -60,7 +67,7 @@ def test_harmonics_are_radiance_times_the_disc():
 @pytest.mark.parametrize(("elevation", "turbidity"), [(90, 2.0), (30, 2.5), (5, 4.0), (0, 6.0)])
 def test_radiance_against_a_loop(elevation, turbidity):
     xyz = attenuated_sun(
-        elevation, turbidity, WAVELENGTHS, SOLAR_RADIANCE, OZONE, WATER, colour_matching()
+        elevation, turbidity, WAVELENGTHS, SOLAR_RADIANCE, OZONE, WATER, color_matching()
     )
     found = sky.sun_radiance(sun_at(elevation), turbidity, space="xyz")
     np.testing.assert_allclose(found, xyz, 1e-11)
@@ -71,7 +78,7 @@ def test_radiance_against_a_loop(elevation, turbidity):
 def test_published_illuminances():
     """Solar illuminance constant 133.1 klx (127.5 before 1990: Darula et al. 2005), and about 100
     klx at most through a clear sky."""
-    luminance = 0.683 * 10 * colour_matching()[1] @ SOLAR_RADIANCE
+    luminance = 0.683 * 10 * color_matching()[1] @ SOLAR_RADIANCE
     assert 125 < luminance * SOLID_ANGLE < 135
     clear = sky.sun_radiance(sun_at(90.0), 2.0, space="xyY")
     assert 95 < clear[2] * SOLID_ANGLE < 105
@@ -83,10 +90,10 @@ def test_published_illuminances():
     assert np.all(np.diff(low[:, 0]) > 0.04)
 
 
-def test_the_colour_matching_is_the_observers():
+def test_the_color_matching_is_the_observers():
     """ȳ peaks with one at 555 nm; the equal-energy spectrum is white, and 106.857 its sum."""
-    assert WAVELENGTHS[np.argmax(colour_matching()[1])] in (550, 560)
-    np.testing.assert_allclose(10 * colour_matching().sum(axis=1), 106.857, 2e-3)
+    assert WAVELENGTHS[np.argmax(color_matching()[1])] in (550, 560)
+    np.testing.assert_allclose(10 * color_matching().sum(axis=1), 106.857, 2e-3)
 
 
 def test_optical_mass():
