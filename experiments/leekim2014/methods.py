@@ -14,10 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsh import adaptive, transfer
-from jaxsh.adaptive._products import lobe_kernel
-from jaxsh.harmonics import product_matrix
-from jaxsh.transfer._layout import in_tiles, out_of_tiles, rows_in_tiles
-from jaxsh.transfer._lobe import reflected
+from jaxsh.harmonics import convolve, evaluate, phong, product_matrix
 
 from ..runner import Context
 from .scenes import Quality, Scene
@@ -29,6 +26,7 @@ THRESHOLD, DIFFUSE_THRESHOLD = 0.02, 0.01  # the paper's
 STILL = "eye product"
 DIFFUSE, EIGHT_BITS = "diffuse", "diffuse, eight bits"
 _BURST = 3  # frames of one way, before the next takes its turn
+_TILE = 1024  # vertices of the product form's tiles
 TURN = 0.05  # of the light from frame to frame, in radians
 
 Light = Float[Array, "3 k"]
@@ -48,7 +46,7 @@ def baselines(scene: Scene) -> dict[str, Way]:
 
 def still(scene: Scene) -> dict[str, Way]:
     """The full computation for an eye that stands still, with all done before that can be."""
-    return {STILL: transfer.eye_product(scene.baked, scene.eye, scene.material)}
+    return {STILL: transfer.fixed_view(scene.baked, scene.eye, scene.material)}
 
 
 def diffuse(scene: Scene) -> dict[str, Way]:
@@ -155,26 +153,37 @@ def _einsum(light, baked, eye, material):
 
 
 def _kernel(baked, eye, material, width: int) -> Float[Array, "k v"]:
-    axis = reflected(eye, baked.positions, baked.normals, False)
-    return lobe_kernel(axis, material.exponent, math.isqrt(width) - 1, True)
+    return _lobe(transfer.reflected_direction(eye, baked.positions, baked.normals), material, width)
+
+
+def _lobe(axis, material, width: int) -> Float[Array, "k n"]:
+    """α_i y_i(B), the harmonics first."""
+    degree = math.isqrt(width) - 1
+    lobe = phong(material.exponent, degree, normalized=True)
+    alpha = convolve(jnp.ones(width, axis.dtype), lobe)
+    return evaluate(axis, degree, axis=0) * alpha[:, None]
 
 
 @jax.jit
 def _product_form(light, baked, eye, material):
-    width = light.shape[-1]
+    width, (count, _) = light.shape[-1], baked.positions.shape
     rows = jnp.concatenate([product_matrix(light).reshape(-1, width), light])
-    axis = reflected(eye, baked.positions, baked.normals, False)
+    axis = transfer.reflected_direction(eye, baked.positions, baked.normals)
 
     def tile(part):
         coefficients, axis = part
-        kernel = lobe_kernel(axis, material.exponent, math.isqrt(width) - 1, True)
+        kernel = _lobe(axis, material, width)
         products = jnp.matmul(rows, coefficients.T, precision="highest")
         channels = products[:-3].reshape(3, width, -1)
         glossy = jnp.stack([jnp.sum(kernel * channel, axis=0) for channel in channels])
         return material.specular * glossy + material.diffuse / math.pi * products[-3:]
 
-    tiles = jax.lax.map(tile, (rows_in_tiles(baked.coefficients), in_tiles(axis)))
-    return out_of_tiles(tiles, len(baked.positions)).T
+    def tiles(vertices):
+        padded = jnp.pad(vertices, ((0, -count % _TILE), (0, 0)), mode="edge")
+        return padded.reshape(-1, _TILE, vertices.shape[1])
+
+    colors = jax.lax.map(tile, (tiles(baked.coefficients), tiles(axis)))
+    return jnp.moveaxis(colors, 1, 2).reshape(-1, 3)[:count]
 
 
 def product_flops(vertices: int, coefficients: int) -> int:

@@ -4,7 +4,7 @@ Of RGB light of K coefficients: 3K² for the glossy and 3K for the diffuse part.
 """
 
 from ..harmonics import num_coefficients
-from ..transfer._nodes import product_nodes
+from ..transfer._glossy_kernels import product_nodes
 
 
 def product_cost(kind: str, start: int, end: int, target: int) -> float:

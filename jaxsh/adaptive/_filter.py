@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float, Int
 from .._core.linalg import tall_product
 from ..harmonics import degree_of, num_coefficients, product_matrix
 from ..transfer import Material, Transfer
-from ..transfer._lobe import reflected
+from ..transfer._glossy_kernels import reflected
 from ._compact import compacted, everywhere
 from ._costs import product_cost
 from ._products import base_product, increment, lobe_kernel

@@ -11,7 +11,7 @@ from numpy.polynomial.polynomial import polyval
 from .._core.host import read_only_cache
 from ..harmonics import degrees, phong
 from ..sphere import fibonacci
-from ..transfer._nodes import product_nodes
+from ..transfer._glossy_kernels import product_nodes
 
 # How far from the pole lobes may point, in radians: half a tile's width, and how far an eye goes
 # before it takes other tiles.

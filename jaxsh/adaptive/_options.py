@@ -9,7 +9,7 @@ from jaxtyping import ArrayLike, Float
 
 from .._core.checks import as_float, is_concrete
 from ..harmonics import degree_of
-from ..transfer._checks import checked_eye, checked_light, checked_material
+from ..transfer._glossy_kernels import checked_eye, checked_light, checked_material
 from ._filter import Filter
 from ._result import AdaptiveResult
 
@@ -52,7 +52,7 @@ def checked(
 ):
     """Arguments of `filtered`, in the transfer's dtype."""
     light, transfer, eye, material = checked_frame(light, transfer, eye, material)
-    count, dtype = transfer.count, light.dtype
+    count, dtype = transfer.num_points, light.dtype
     target, base, rings = degree_of(light.shape[-1]), operator.index(base), operator.index(rings)
     if not 0 <= base <= target:
         raise ValueError(f"expected base from 0 to the light's degree, {target}, got {base}")
@@ -83,7 +83,7 @@ def checked(
 
 
 def checked_frame(light, transfer, eye, material):
-    count, dtype = transfer.count, transfer.dtype
+    count, dtype = transfer.num_points, transfer.dtype
     light = checked_light(light, count, transfer.degree, dtype)
     if light.ndim > 2:
         raise ValueError(f"expected one light (3, K) for all vertices, got shape {light.shape}")

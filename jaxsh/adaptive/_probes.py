@@ -10,8 +10,7 @@ from .._core.checks import align
 from .._core.xla import materialize
 from ..harmonics import degree_of
 from ..transfer import Material, QuantizedTransfer, Transfer, shade_diffuse
-from ..transfer._lobe import lobe_polynomial, mirrored
-from ..transfer._lobe_products import lobe_products
+from ..transfer._glossy_kernels import lobe_polynomial, lobe_products, mirrored
 from ._compact import compacted, everywhere
 from ._costs import product_cost, sum_cost
 from ._options import checked_frame, checked_scalar
@@ -56,7 +55,7 @@ def shade_probes(
     Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
     """
     light, transfer, eye, material = checked_frame(light, transfer, eye, material)
-    count = transfer.count
+    count = transfer.num_points
     if len(probes.nearest) != count or probes.degree != transfer.degree:
         raise ValueError(
             f"expected probes of {count} vertices and degree {transfer.degree}, got "

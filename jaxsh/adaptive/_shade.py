@@ -52,8 +52,8 @@ def shade(
     `transfer.quantize` makes.
 
     `shade_glossy` is that of a sampled transfer, on the CPU. Where only the light turns, none of
-    these is as fast as `transfer.eye_product`, which is exact; where only the eye moves, a
-    `transfer.light_product` is at hand.
+    these is as fast as `transfer.fixed_view`, which is exact; where only the eye moves, a
+    `transfer.fixed_light` is at hand.
     `options` are those of the function `shade_<method>`, which says what it takes and returns.
     Experiment `leekim2014.table1` prints what each method gains, and what it costs in quality.
 

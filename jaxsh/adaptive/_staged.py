@@ -12,9 +12,7 @@ from .._core.linalg import matmul, tall_product
 from .._core.xla import materialize
 from ..harmonics import degree_of
 from ..transfer import QuantizedTransfer, SampledTransfer, Transfer, quantize, sample
-from ..transfer._lobe import lobe
-from ..transfer._nodes import product_nodes
-from ..transfer._quantized import in_steps
+from ..transfer._glossy_kernels import in_steps, lobe, product_nodes
 
 
 class SampledRows(eqx.Module):

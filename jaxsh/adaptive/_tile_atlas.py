@@ -8,7 +8,7 @@ from jaxtyping import Array, ArrayLike, Float, Int
 
 from ..sphere import fibonacci
 from ..transfer import Transfer
-from ..transfer._checks import checked_eye
+from ..transfer._glossy_kernels import checked_eye
 from ._local_rule import check_rule
 from ._tile_sets import (
     BLOCK,

@@ -12,9 +12,7 @@ from jaxtyping import Array, ArrayLike, Float, Int, Int8
 from .._core.linalg import matmul
 from ..harmonics import degree_of, evaluate, rotate
 from ..transfer import Transfer
-from ..transfer._checks import checked_eye
-from ..transfer._lobe import reflected, rows_of, unit
-from ..transfer._quantized import in_steps
+from ..transfer._glossy_kernels import checked_eye, in_steps, reflected, rows_of, unit
 from ._local_rule import check_rule, local_rule
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.

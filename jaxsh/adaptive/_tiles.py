@@ -10,9 +10,13 @@ from .._core.linalg import matmul
 from .._core.xla import materialize
 from ..harmonics import degree_of, phong
 from ..transfer import Material, QuantizedTransfer, Transfer, shade_diffuse
-from ..transfer._block_sums import block_sums
-from ..transfer._checks import checked_eye, checked_light, checked_material
-from ..transfer._lobe import mirrored
+from ..transfer._glossy_kernels import (
+    block_sums,
+    checked_eye,
+    checked_light,
+    checked_material,
+    mirrored,
+)
 from ._costs import full_cost, product_cost, sum_cost
 from ._result import AdaptiveResult
 from ._tile_sets import TileSet
@@ -57,7 +61,7 @@ def shade_tiles(
 
     Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
     """
-    count, dtype = transfer.count, tiles.basis.dtype
+    count, dtype = transfer.num_points, tiles.basis.dtype
     if tiles.place.shape != (count,) or tiles.degree != transfer.degree:
         raise ValueError(
             f"expected tiles of {count} vertices and degree {transfer.degree}, got "

@@ -9,9 +9,7 @@ from jaxtyping import ArrayLike, Float
 from .._core.xla import materialize
 from ..harmonics import degree_of, num_coefficients
 from ..transfer import Material, SampledTransfer, Transfer
-from ..transfer._lobe import lobe_polynomial, mirrored
-from ..transfer._lobe_products import lobe_products
-from ..transfer._shade import irradiances
+from ..transfer._glossy_kernels import lobe_polynomial, lobe_products, mirrored
 from ._compact import compacted
 from ._costs import product_cost, sum_cost
 from ._filter import Filter, albedos, threshold
@@ -106,7 +104,7 @@ def _two_stage(light, staged, eye, material, settings: Filter, previous):
     glossy = jnp.where(region[None], compacted(second, region), outside)
     if settings.smoothing:
         glossy = basic + smooth(glossy - basic, region, transfer.neighbors)
-    irradiance = irradiances(light, staged.diffuse).T
+    irradiance = staged.diffuse.irradiances(light).T
     color = albedo["specular"] * glossy + albedo["diffuse"] * irradiance
 
     reached = jnp.where(region, jnp.asarray(target, jnp.int32), jnp.asarray(shown, jnp.int32))

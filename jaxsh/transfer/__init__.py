@@ -1,34 +1,42 @@
 """What reaches a surface of the light around it: transfer, baked once per mesh, and its shading.
 
-`bake` casts the rays and projects what each vertex sees; the shading that follows is a product of
-coefficients, for any light, and differentiates.
+`bake` casts the rays and projects what each vertex sees, `unshadowed` needs none; the shading that
+follows is a product of coefficients, for any light, and differentiates.
 """
 
 from ._bake import bake
-from ._eye_product import EyeProduct, eye_product
 from ._file import load, save
-from ._glossy import shade_glossy
-from ._light_product import LightProduct, light_product
+from ._fixed_light import FixedLight, fixed_light
+from ._fixed_view import FixedView, fixed_view
 from ._material import Material
-from ._quantized import QuantizedTransfer, quantize
-from ._sampled import SampledTransfer, sample
-from ._shade import shade_diffuse
-from ._transfer import Transfer
+from ._shade import reflected_direction, shade_diffuse, shade_glossy
+from ._transfer import (
+    AbstractTransfer,
+    QuantizedTransfer,
+    SampledTransfer,
+    Transfer,
+    quantize,
+    sample,
+)
+from ._unshadowed import unshadowed
 
 __all__ = [
-    "EyeProduct",
-    "LightProduct",
+    "AbstractTransfer",
+    "FixedLight",
+    "FixedView",
     "Material",
     "QuantizedTransfer",
     "SampledTransfer",
     "Transfer",
     "bake",
-    "eye_product",
-    "light_product",
+    "fixed_light",
+    "fixed_view",
     "load",
     "quantize",
+    "reflected_direction",
     "sample",
     "save",
     "shade_diffuse",
     "shade_glossy",
+    "unshadowed",
 ]

@@ -1,26 +1,35 @@
-"""What a surface does with light."""
+"""Surface materials, and the argument checks that all shading shares, made before tracing."""
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import as_float, is_concrete
+from ..harmonics import degree_of
 
 
 def _as_strong(value: ArrayLike) -> Float[Array, "..."]:
-    """Of a type of its own, so that numbers and arrays run the same compiled programs."""
+    """Gives a type of its own, so that numbers and arrays run the same compiled programs."""
     array = as_float(value)
     return array.astype(array.dtype)
 
 
 class Material(eqx.Module):
-    """A diffuse and a Phong-like glossy share of the light, for a mesh of V vertices.
+    """Holds how a surface of V vertices reflects light: diffusely, and through a Phong lobe.
 
     `diffuse` and `specular` are albedos: a number, RGB (3,), or per vertex (V, 1) or (V, 3).
     `exponent` is that of the glossy lobe, a number or (V,). Differentiable in all three.
 
     Raises `ValueError` for other shapes, and where values are known and an albedo is not finite
     and >= 0, or an exponent not finite and above -1.
+
+    **Example**
+
+    >>> from jaxsh.transfer import Material
+    >>> plastic = Material(diffuse=(0.5, 0.1, 0.1), specular=0.04, exponent=32.0)
+    >>> plastic.diffuse.shape, plastic.exponent.shape
+    ((3,), ())
     """
 
     diffuse: Float[Array, "..."] = eqx.field(converter=_as_strong)
@@ -55,3 +64,59 @@ class Material(eqx.Module):
         }
         if len(set(counts.values())) > 1:
             raise ValueError(f"a material is of one mesh, but its numbers of vertices are {counts}")
+
+
+def checked_light(
+    light: Float[ArrayLike, "..."], count: int, degree: int, dtype: jnp.dtype
+) -> Float[Array, "..."]:
+    """Casts a light that all of `count` vertices share, or one for each, of at most this degree."""
+    light = as_float(light)
+    lights = light.shape[:-2][-1:]  # () where all vertices share one
+    if light.ndim < 2 or light.shape[-2] != 3 or lights not in ((), (1,), (count,)):
+        raise ValueError(
+            f"expected light (3, K), or (..., {count}, 3, K) with one for each vertex, or "
+            f"(..., 1, 3, K) for a batch of shared ones, got shape {light.shape}"
+        )
+    if degree_of(light.shape[-1]) > degree:
+        raise ValueError(
+            f"the light's degree {degree_of(light.shape[-1])} is above the transfer's, {degree}; "
+            f"cut it to light[..., :{(degree + 1) ** 2}]"
+        )
+    return _cast(light, dtype)
+
+
+def checked_one_light(
+    light: Float[ArrayLike, "..."], count: int, degree: int, dtype: jnp.dtype
+) -> Float[Array, "3 k"]:
+    """Casts a light (3, K) that all vertices share, of at most this degree."""
+    light = checked_light(light, count, degree, dtype)
+    if light.ndim > 2:
+        raise ValueError(f"expected one light (3, K) for all vertices, got shape {light.shape}")
+    return light
+
+
+def checked_material(material: Material, count: int, dtype: jnp.dtype) -> Material:
+    """Casts a material whose arrays per vertex are of `count` vertices."""
+    for name, ndim in (("diffuse", 2), ("specular", 2), ("exponent", 1)):
+        array = getattr(material, name)
+        if array.ndim == ndim and len(array) != count:
+            raise ValueError(
+                f"expected a material of {count} vertices, but its {name} is of {len(array)}"
+            )
+    arrays = (material.diffuse, material.specular, material.exponent)
+    if all(array.dtype == dtype for array in arrays):
+        return material
+    return Material(*(array.astype(dtype) for array in arrays))
+
+
+def checked_eye(eye: Float[ArrayLike, "..."], dtype: jnp.dtype) -> Float[Array, " 3"]:
+    """Casts a point or direction (3,)."""
+    eye = as_float(eye)
+    if eye.shape != (3,):
+        raise ValueError(f"expected eye (3,), got shape {eye.shape}")
+    return _cast(eye, dtype)
+
+
+def _cast(array: Array, dtype: jnp.dtype) -> Array:
+    # To cast to the same type does nothing, but takes time of every frame.
+    return array if array.dtype == dtype else array.astype(dtype)

@@ -1,5 +1,6 @@
-"""Shading by products of coefficients."""
+"""Diffuse and glossy shading, by products of coefficients and sums over directions."""
 
+import functools
 import math
 
 import jax
@@ -7,20 +8,18 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, as_float
-from .._core.linalg import tall_product
-from .._core.xla import materialize
-from ._block_sums import block_sums
-from ._checks import checked_light
-from ._quantized import QuantizedTransfer
-from ._transfer import Transfer
+from ..harmonics import degree_of
+from ._glossy_kernels import lobe_polynomial, lobe_products, reflected
+from ._material import Material, checked_eye, checked_light, checked_material
+from ._transfer import AbstractTransfer
 
 
 def shade_diffuse(
     light: Float[ArrayLike, "... 3 k"],
-    transfer: Transfer | QuantizedTransfer,
+    transfer: AbstractTransfer,
     albedo: Float[ArrayLike, "..."],
 ) -> Float[Array, "... v 3"]:
-    """Radiance albedo/π · Σ_k light_k T_k that leaves each of V diffuse vertices.
+    """Compute the radiance albedo/π · Σ_k light_k T_k that leaves each of V diffuse vertices.
 
     **Arguments**
 
@@ -28,22 +27,28 @@ def shade_diffuse(
       light for each vertex. So in a batch of shared lights an axis of length 1 takes the vertices'
       place: (batch, 1, 3, K).
     - `transfer`: of the light's degree or above. A lower light is exact, since harmonics are
-      orthogonal; a higher one would lose its upper bands unsaid, and is refused. What `quantize`
-      made of it takes less time and memory, and shared lights alone.
+      orthogonal; a higher one raises, since its upper bands would be dropped silently. The result
+      of `quantize` takes less time and memory, and shared lights alone.
     - `albedo`: a number, RGB (3,), or per vertex (V, 1) or (V, 3).
 
-    **Returns** (..., V, 3), in the dtype of the transfer. Linear in light, transfer and
-    albedo, and differentiable in each, forward and reverse. Values are not looked at.
+    **Returns** (..., V, 3), in the dtype of the transfer. Linear in light, coefficients and
+    albedo, and differentiable in each, forward and reverse; the positions and normals of the
+    transfer do not enter. Values are not looked at.
 
     Raises `ValueError` for shapes that do not fit.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> sky = jnp.full((3, 1), (4 * jnp.pi) ** 0.5)  # radiance 1 from everywhere
+    >>> color = transfer.shade_diffuse(sky, transfer.unshadowed(up, up, degree=0), 0.25)
+    >>> color.shape, round(float(color[0, 0]), 4)
+    ((1, 3), 0.25)
     """
-    quantized = isinstance(transfer, QuantizedTransfer)
-    count, dtype = transfer.count, transfer.dtype
+    count, dtype = transfer.num_points, transfer.dtype
     light, albedo = checked_light(light, count, transfer.degree, dtype), as_float(albedo)
-    if quantized and light.ndim > 2 and light.shape[-3] != 1:
-        raise ValueError(
-            f"expected lights that all vertices share, for a quantized transfer, got {light.shape}"
-        )
     if albedo.shape not in ((), (3,), (count, 1), (count, 3)):
         raise ValueError(
             f"expected albedo as a number, (3,), ({count}, 1) or ({count}, 3), got shape "
@@ -56,23 +61,144 @@ def shade_diffuse(
 def _shade_diffuse(light, transfer, albedo):
     if light.ndim == 2 or light.shape[-3] == 1:
         batch = light.shape[:-3]
-        products = irradiances(light.reshape(math.prod(batch) * 3, light.shape[-1]), transfer)
+        products = transfer.irradiances(light.reshape(math.prod(batch) * 3, light.shape[-1]))
         irradiance = jnp.moveaxis(products.reshape(len(products), *batch, 3), 0, -2)
     else:
-        coefficients = transfer.coefficients[:, : light.shape[-1]]
+        coefficients = transfer.vectors(light.shape[-1])
         irradiance = jnp.sum(jnp.multiply(*align(light, coefficients[:, None])), axis=-1)
     return jnp.multiply(*align(irradiance, albedo / math.pi))
 
 
-def irradiances(
-    rows: Float[Array, "n k"], transfer: Transfer | QuantizedTransfer
-) -> Float[Array, "v n"]:
-    """Of lights of the transfer's degree or below."""
-    if isinstance(transfer, Transfer):
-        width = transfer.coefficients.shape[-1]
-        filled = jnp.pad(rows, ((0, 0), (0, width - rows.shape[1])))
-        return tall_product(transfer.coefficients, filled)
-    width = rows.shape[1]
-    scaled = (rows * transfer.steps[None, :width])[None]
-    sums = materialize(block_sums, scaled, transfer.whole[:, :width])
-    return jnp.swapaxes(sums, 1, 2).reshape(-1, len(rows))[: transfer.count]
+def shade_glossy(
+    light: Float[ArrayLike, "... 3 k"],
+    transfer: AbstractTransfer,
+    eye: Float[ArrayLike, " 3"],
+    material: Material,
+    *,
+    distant: bool = False,
+    normalized: bool = True,
+) -> Float[Array, "... v 3"]:
+    """Compute the radiance that V vertices send to the eye, reflected diffusely and glossily.
+
+    Lee & Kim 2014, "Locally adaptive products", equations 2 to 6, with every function cut to the
+    light's degree: the product R of light and transfer, convolved with the lobe (bands times α_l),
+    and evaluated in the direction B towards the eye, mirrored about the normal:
+
+        ρ_d/π Σ_i L_i O_i + ρ_s Σ_i α_i y_i(B) R_i,   R_i = Σ_j L̂_ij O_j.
+
+    The second sum is ∫ L V max(0, n·ω) lobe(B·ω) dω, since the transfer O holds visibility and
+    cosine. An integral of three functions of one degree is a sum over as few directions as
+    integrate it exactly, so L̂ need not be built, nor multiplied with. The result is the same to
+    rounding.
+
+    **Arguments**
+
+    - `light`: coefficients (3, K) that all vertices share, or with more axes (..., V, 3, K), one
+      light for each vertex. So in a batch of shared lights an axis of length 1 takes the vertices'
+      place: (batch, 1, 3, K). A batch of shared ones costs little more than one; lights of their
+      own cost several times as much.
+    - `transfer`: of the light's degree or above, cut to the light's. For frame after frame
+      `sample` it at that degree once, which leaves little of the work. Where only the camera
+      moves, `fixed_light` has computed R already; where only the light turns, `fixed_view` all
+      but the product with it.
+    - `eye`: a point, or with `distant` the direction, of any length, to an eye far away.
+    - `material`: albedos and the lobe's exponent. The lobe is cut to the light's degree.
+    - `normalized`: whether the lobe max(0, B·ω)^k is divided by its integral 2π/(k+1). Otherwise
+      the bare power, as in the paper.
+
+    The cosine of the transfer stays inside the integral, as in the paper, so the glossy part of a
+    normalized lobe is less than the albedo times the mean of light over the lobe: for light of
+    radiance 1 from everywhere and nothing in its way it is (k+1)/(k+2) of the albedo where the
+    eye looks along the normal, and about n·ω_o of it elsewhere.
+
+    **Returns** (..., V, 3), in the dtype of the transfer. Vertices that face away from the eye get
+    the same formula's value, which nobody sees: B then points into the surface. Where the normal
+    is zero or not finite, B is -ω_o; an eye on a vertex is taken to be above it. Linear in light
+    and transfer, and differentiable in all arguments, forward and reverse; light that rings below
+    zero stays there.
+
+    Raises `ValueError` for shapes that do not fit, and for a sampled transfer of another degree
+    than the light's.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> sky = jnp.zeros((3, 4)).at[:, 0].set((4 * jnp.pi) ** 0.5)
+    >>> made, mirror = transfer.unshadowed(up, up, degree=1), transfer.Material(0.0, 1.0, 8.0)
+    >>> color = transfer.shade_glossy(sky, made, jnp.asarray([0.0, 0.0, 5.0]), mirror)
+    >>> color.shape
+    (1, 3)
+    """
+    count, dtype = transfer.num_points, transfer.dtype
+    eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
+    light = checked_light(light, count, transfer.degree, dtype)
+    form = transfer.glossy_form(degree_of(light.shape[-1]))
+    return _shade_glossy(light, form, eye, material, distant, normalized)
+
+
+@functools.partial(jax.jit, static_argnames=("distant", "normalized"))
+def _shade_glossy(light, transfer, eye, material, distant, normalized):
+    axis = transfer.reflections(eye, distant)
+    lobes = lobe_polynomial(material.exponent, degree_of(light.shape[-1]), normalized)
+    glossy, irradiance = _gather(light, transfer, axis, lobes)
+    diffuse = jnp.multiply(*align(irradiance, material.diffuse / math.pi))
+    return diffuse + jnp.multiply(*align(glossy, material.specular))
+
+
+def _gather(light, transfer, axis, lobes):
+    """Computes what each vertex receives through its lobe and over its hemisphere: (..., V, 3)."""
+    *batch, _, width = light.shape
+    if len(batch) and batch[-1] != 1:
+        # A light of its own meets the product of transfer and lobe, which needs every harmonic.
+        unit_lights = jnp.eye(width, dtype=light.dtype)
+        products = lobe_products(unit_lights, transfer, axis, lobes).T, transfer.vectors(width)
+        return tuple(
+            jnp.sum(jnp.multiply(*align(light, product[:, None])), axis=-1) for product in products
+        )
+    rows = light.reshape(math.prod(light.shape[:-1]), width)
+    glossy = lobe_products(rows, transfer, axis, lobes).T
+    return tuple(
+        jnp.moveaxis(product.reshape(-1, *batch[:-1], 3), 0, -2)
+        for product in (glossy, transfer.irradiances(rows))
+    )
+
+
+def reflected_direction(
+    eye: Float[ArrayLike, " 3"],
+    positions: Float[ArrayLike, "v 3"],
+    normals: Float[ArrayLike, "v 3"],
+    *,
+    distant: bool = False,
+) -> Float[Array, "v 3"]:
+    """Mirror the direction towards the eye about each normal: B(ω_o) = 2 (n·ω_o) n - ω_o.
+
+    The direction in which glossy shading looks (Lee & Kim 2014, equation 4), always of unit
+    length. A normal that is zero or not finite counts as zero, which turns B into -ω_o; an eye on
+    the vertex itself is taken to be straight above it.
+
+    **Arguments**
+
+    - `eye`: a point, or with `distant` the direction, of any length, to an eye far away.
+    - `positions`, `normals`: of V vertices, normals of any length.
+
+    **Returns** (V, 3). Differentiable in all, forward and reverse. Raises `ValueError` for shapes
+    that do not fit.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> at, up = jnp.zeros((1, 3)), jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> [round(float(x), 2) for x in transfer.reflected_direction([3.0, 0.0, 4.0], at, up)[0]]
+    [-0.6, 0.0, 0.8]
+    """
+    positions, normals = as_float(positions), as_float(normals)
+    if positions.ndim != 2 or positions.shape[1] != 3 or positions.shape != normals.shape:
+        raise ValueError(
+            f"expected positions and normals (V, 3), got shapes {positions.shape} and "
+            f"{normals.shape}"
+        )
+    eye = checked_eye(eye, positions.dtype)
+    return reflected(eye, positions, normals.astype(positions.dtype), distant).T

@@ -1,20 +1,93 @@
-"""The baked thing."""
+"""Transfer in its forms: coefficients, values in directions, and eight bits."""
+
+import abc
+import functools
+from typing import Union
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, DTypeLike, Float, Int, Int8
 
-from ..harmonics import degree_of
+from .._core.checks import check_degree, is_concrete
+from .._core.linalg import matmul, tall_product
+from .._core.xla import materialize, on_mesh
+from ..harmonics import degree_of, num_coefficients
+from ._glossy_kernels import (
+    block_sums,
+    in_steps,
+    mirrored,
+    node_passes,
+    reflected,
+    rows_of,
+)
+
+# Vertices side by side: a block's coefficients stay in the first cache.
+_BLOCK = 128
 
 
-class Transfer(eqx.Module):
-    """Transfer of a mesh with V vertices, made by `bake`: what shading needs, and no more.
+class AbstractTransfer(eqx.Module):
+    """Holds how light from all around reaches V points, up to a degree, in one form or another.
+
+    The forms are `Transfer`, `SampledTransfer`, `QuantizedTransfer` and
+    `adaptive.StagedTransfer`; `shade_diffuse` takes each of them.
+    """
+
+    @property
+    @abc.abstractmethod
+    def num_points(self) -> int:
+        """V."""
+
+    @property
+    @abc.abstractmethod
+    def degree(self) -> int:
+        """The largest degree of a light that it takes."""
+
+    @property
+    @abc.abstractmethod
+    def dtype(self) -> jnp.dtype:
+        """The dtype of the colors that it shades."""
+
+    @abc.abstractmethod
+    def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
+        """Compute what reaches each point of n lights that all points share, cosine included."""
+
+    @abc.abstractmethod
+    def vectors(self, width: int) -> Float[Array, "v k"]:
+        """Return the first `width` coefficients of each point.
+
+        Raises `ValueError` for a form that does not hold them.
+        """
+
+    @abc.abstractmethod
+    def glossy_form(self, degree: int) -> Union["Transfer", "SampledTransfer"]:
+        """Return the form that glossy shading with a light of this degree takes.
+
+        Raises `ValueError` where there is none.
+        """
+
+
+class Transfer(AbstractTransfer):
+    """Holds transfer coefficients of V points, baked by `bake` or made by `unshadowed`.
 
     `coefficients` are ∫ V(ω) max(0, n·ω) y_i(ω) dω: visibility and cosine, without albedo and
     without 1/π, so that their product with the coefficients of a light is irradiance. Bounces, if
-    baked, are in them. `neighbors` is the padded table of `geometry.neighbors`.
+    baked, are in them. `neighbors` is the padded table of `geometry.neighbors`: a row names the
+    point itself where it has fewer neighbors than others.
 
-    Differentiable in coefficients, positions and normals; neighbours are constants.
+    Shading differentiates in the coefficients, and glossy shading in positions and normals too,
+    through the mirrored direction alone. The coefficients of a bake are constants: neither they
+    nor `shade_diffuse` change with the positions and normals stored beside them, so that its
+    derivative in those is 0. `unshadowed` gives coefficients that do depend on the normals.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> made = transfer.unshadowed(up, up, degree=2)
+    >>> made.num_points, made.degree, made.truncated(1).coefficients.shape
+    (1, 2, (1, 4))
     """
 
     coefficients: Float[Array, "v k"]
@@ -23,8 +96,7 @@ class Transfer(eqx.Module):
     neighbors: Int[Array, "v n"]
 
     @property
-    def count(self) -> int:
-        """V."""
+    def num_points(self) -> int:
         return self.coefficients.shape[0]
 
     @property
@@ -34,3 +106,196 @@ class Transfer(eqx.Module):
     @property
     def degree(self) -> int:
         return degree_of(self.coefficients.shape[-1])
+
+    def truncated(self, degree: int) -> "Transfer":
+        """Cut the coefficients to a degree; raises `ValueError` for one above the transfer's."""
+        cut = self.coefficients[:, : num_coefficients(checked_degree(self, degree))]
+        return Transfer(cut, self.positions, self.normals, self.neighbors)
+
+    def astype(self, dtype: DTypeLike) -> "Transfer":
+        """Cast all but the neighbors."""
+        coefficients, positions, normals = (
+            array.astype(dtype) for array in (self.coefficients, self.positions, self.normals)
+        )
+        return Transfer(coefficients, positions, normals, self.neighbors)
+
+    def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
+        return _irradiances(self.coefficients, lights)
+
+    def vectors(self, width: int) -> Float[Array, "v k"]:
+        return self.coefficients[:, :width]
+
+    def glossy_form(self, degree: int) -> "Transfer":
+        return self
+
+    def reflections(self, eye: Float[Array, " 3"], distant: bool) -> Float[Array, "3 v"]:
+        """Mirror the direction towards the eye about each normal, components first."""
+        return reflected(eye, self.positions, self.normals, distant)
+
+    def node_passes(self, degree: int) -> Float[Array, "p n k"]:
+        """Return what `at_nodes` takes of each pass of nodes."""
+        return jnp.asarray(node_passes(degree).basis, self.dtype)
+
+    def at_nodes(self, some: Float[Array, "n k"], width: int) -> Float[Array, "n v"]:
+        """Evaluate the transfer at the nodes of one pass."""
+        return matmul(some, self.coefficients[:, :width].T)
+
+
+class SampledTransfer(AbstractTransfer):
+    """Holds the transfer of V points, cut to a degree, at N directions: made once by `sample`.
+
+    The directions are an exact quadrature for products of three functions of that degree, so
+    that nothing is lost. `samples` are in the passes in which shading goes through them. At degree
+    10 there are 350 directions; with the coefficients beside them, that is four times the memory
+    of the transfer.
+    """
+
+    samples: Float[Array, "passes n v"]
+    coefficients: Float[Array, "v k"]
+    positions: Float[Array, "3 v"]
+    normals: Float[Array, "3 v"]  # at unit length
+
+    @property
+    def degree(self) -> int:
+        return degree_of(self.coefficients.shape[-1])
+
+    @property
+    def num_points(self) -> int:
+        return self.coefficients.shape[0]
+
+    @property
+    def dtype(self) -> jnp.dtype:
+        return self.coefficients.dtype
+
+    def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
+        return _irradiances(self.coefficients, lights)
+
+    def vectors(self, width: int) -> Float[Array, "v k"]:
+        return self.coefficients[:, :width]
+
+    def glossy_form(self, degree: int) -> "SampledTransfer":
+        if degree != self.degree:
+            raise ValueError(
+                f"expected a light of the sampled transfer's degree, {self.degree}, got "
+                f"{degree}; sample the transfer at that degree"
+            )
+        return self
+
+    def reflections(self, eye: Float[Array, " 3"], distant: bool) -> Float[Array, "3 v"]:
+        """Mirror the direction towards the eye about each normal, components first."""
+        return mirrored(eye, self.positions, self.normals, distant)
+
+    def node_passes(self, degree: int) -> Float[Array, "p n v"]:
+        """Return what `at_nodes` takes of each pass of nodes."""
+        return self.samples
+
+    def at_nodes(self, some: Float[Array, "n v"], width: int) -> Float[Array, "n v"]:
+        """Evaluate the transfer at the nodes of one pass."""
+        return some
+
+
+class QuantizedTransfer(AbstractTransfer):
+    """Holds int8 transfer coefficients of V points: a quarter of the memory traffic of float32.
+
+    Made once by `quantize`, for `shade_diffuse` with lights that all points share, which reads
+    each coefficient once a frame and waits for memory.
+    """
+
+    codes: Int8[Array, "blocks k b"]  # points in their order
+    scales: Float[Array, " k"]  # a coefficient is its code times its scale
+    filled: int = eqx.field(static=True)  # places without a point at the end of the last block
+
+    @property
+    def num_points(self) -> int:
+        return self.codes.shape[0] * self.codes.shape[2] - self.filled
+
+    @property
+    def dtype(self) -> jnp.dtype:
+        return self.scales.dtype
+
+    @property
+    def degree(self) -> int:
+        return degree_of(len(self.scales))
+
+    def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
+        width = lights.shape[1]
+        scaled = (lights * self.scales[None, :width])[None]
+        sums = materialize(block_sums, scaled, self.codes[:, :width])
+        rows = jnp.swapaxes(sums, 1, 2).reshape(-1, len(lights))
+        return rows[: self.num_points] if self.filled else rows
+
+    def vectors(self, width: int) -> Float[Array, "v k"]:
+        raise ValueError("expected lights that all vertices share, for a quantized transfer")
+
+    def glossy_form(self, degree: int) -> Transfer:
+        raise ValueError("glossy shading needs a transfer, or samples of it, not its eight bits")
+
+
+def sample(transfer: Transfer, degree: int | None = None) -> SampledTransfer:
+    """Evaluate the transfer, cut to `degree` (default: all of it), at the nodes of glossy shading.
+
+    `shade_glossy` does this on the way where it is given coefficients. Linear and differentiable.
+    Raises `ValueError` for a degree that the transfer does not have.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> transfer.sample(transfer.unshadowed(up, up, degree=1)).samples.shape
+    (1, 6, 1)
+    """
+    return _sample(transfer, checked_degree(transfer, degree))
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _sample(transfer, degree):
+    coefficients = transfer.coefficients[:, : num_coefficients(degree)]
+    basis = jnp.asarray(node_passes(degree).basis, coefficients.dtype)
+    values = matmul(basis.reshape(-1, basis.shape[2]), coefficients.T)
+    samples = values.reshape(*basis.shape[:2], -1)
+    positions, normals = rows_of(transfer.positions, transfer.normals)
+    return SampledTransfer(samples, coefficients, positions, normals)
+
+
+def quantize(transfer: Transfer) -> QuantizedTransfer:
+    """Round the transfer's coefficients to eight bits.
+
+    Each harmonic has a scale of its own, 1/127 of the largest of all points' coefficients, and
+    what is lost is at most half of it. Experiment `leekim2014.table1` prints what that is in a
+    picture. Rounding has no derivative: the result is a constant. Raises `ValueError` for
+    coefficients that are not finite; under `jit` these make their harmonic non-finite.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> transfer.quantize(transfer.unshadowed(up, up, degree=1)).codes.dtype.name
+    'int8'
+    """
+    rows = transfer.coefficients
+    if is_concrete(rows) and not bool(jnp.isfinite(rows).all()):
+        raise ValueError("expected coefficients that are finite everywhere")
+    codes, scales = in_steps(rows, 0)
+    count, width = rows.shape
+    # On a mesh of devices a single block, whose points stay sharded as they are.
+    size = count if on_mesh(rows) else _BLOCK
+    filled = -count % size if count else 0
+    blocks = jnp.pad(codes, ((0, filled), (0, 0))).reshape(-1, size, width)
+    return QuantizedTransfer(jnp.swapaxes(blocks, 1, 2), scales, filled)
+
+
+def _irradiances(coefficients, lights):
+    filled = jnp.pad(lights, ((0, 0), (0, coefficients.shape[1] - lights.shape[1])))
+    return tall_product(coefficients, filled)
+
+
+def checked_degree(transfer: AbstractTransfer, degree: int | None) -> int:
+    """Returns a degree that the transfer has (default: its own)."""
+    degree = transfer.degree if degree is None else check_degree(degree)
+    if degree > transfer.degree:
+        raise ValueError(
+            f"expected a degree of at most the transfer's, {transfer.degree}, got {degree}"
+        )
+    return degree

@@ -9,8 +9,7 @@ from jaxsh.adaptive import _local_rule, _tiles
 from jaxsh.adaptive._tile_atlas import TileFollower, make_tile_atlas
 from jaxsh.adaptive._tile_sets import Tiling, arrange, make_tiles, make_tiling
 from jaxsh.adaptive._tiles import shade_tiles
-from jaxsh.transfer._lobe import reflected
-from jaxsh.transfer._nodes import product_nodes
+from jaxsh.transfer._glossy_kernels import product_nodes, reflected
 
 COUNT, DEGREE = 300, 3
 WIDTH = (DEGREE + 1) ** 2

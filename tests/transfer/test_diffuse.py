@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from jax.test_util import check_grads
 
-from jaxsh.transfer import Material, Transfer, quantize, shade_diffuse, shade_glossy
-from jaxsh.transfer._block_sums import _as_matrices, _written_out
-from jaxsh.transfer._quantized import in_steps
+from jaxsh.transfer import Material, Transfer, quantize, sample, shade_diffuse, shade_glossy
+from jaxsh.transfer._glossy_kernels import _as_matrices, _written_out, in_steps
 
 V, K = 6, 9
 
@@ -139,14 +138,14 @@ def test_bad_materials_are_refused(values, message):
 def test_quantized_is_the_definition_of_what_was_rounded(rng, dtype, rtol, lights):
     made = transfer(rng, dtype)
     quantized = quantize(made)
-    assert (quantized.count, quantized.degree) == (V, 2)
-    steps = np.abs(made.coefficients).max(axis=0) / 127
-    np.testing.assert_allclose(quantized.steps, steps, rtol=1e-6)
-    rounded = np.round(np.asarray(made.coefficients) / np.asarray(quantized.steps))
-    np.testing.assert_array_equal(quantized.whole[0, :, :V].T, rounded)
+    assert (quantized.num_points, quantized.degree) == (V, 2)
+    scales = np.abs(made.coefficients).max(axis=0) / 127
+    np.testing.assert_allclose(quantized.scales, scales, rtol=1e-6)
+    rounded = np.round(np.asarray(made.coefficients) / np.asarray(quantized.scales))
+    np.testing.assert_array_equal(quantized.codes[0, :, :V].T, rounded)
     light = rng.normal(size=(*lights, 3, K))
     each = np.broadcast_to(light, (*lights[:-1], V, 3, K))
-    exact = np.einsum("...vck,vk->...vc", each, rounded * np.asarray(quantized.steps)) / np.pi
+    exact = np.einsum("...vck,vk->...vc", each, rounded * np.asarray(quantized.scales)) / np.pi
     got = shade_diffuse(jnp.asarray(light, dtype), quantized, 1.0)
     assert got.dtype == dtype
     np.testing.assert_allclose(got, exact, rtol=rtol, atol=rtol * np.abs(exact).max())
@@ -183,9 +182,9 @@ def test_quantized_of_more_than_a_block_and_of_zeros(rng):
 
 def test_what_is_not_finite_is_not_rounded_away():
     values = jnp.asarray([[1.0, 0.0, 2.0], [jnp.nan, 0.0, -4.0]])
-    whole, steps = in_steps(values, 0)
-    np.testing.assert_array_equal(np.asarray(whole)[:, 2], [64, -127])  # 63.5 to even
-    np.testing.assert_allclose(steps, [np.nan, 1.0, 4 / 127], rtol=1e-15)
+    codes, scales = in_steps(values, 0)
+    np.testing.assert_array_equal(np.asarray(codes)[:, 2], [64, -127])  # 63.5 to even
+    np.testing.assert_allclose(scales, [np.nan, 1.0, 4 / 127], rtol=1e-15)
 
 
 def test_quantized_refuses_what_does_not_fit(rng, unchecked):
@@ -214,3 +213,27 @@ def test_written_out_sums_are_the_matrix_products(rng, dtype):
     expected = np.einsum("bcn,bnv->bcv", weights, np.asarray(values))
     for form in (_written_out, _as_matrices):
         np.testing.assert_allclose(form(weights, values), expected, atol=1e-12)
+
+
+def test_truncated_and_cast(rng, unchecked):
+    made = transfer(rng)
+    cut = made.truncated(1)
+    np.testing.assert_array_equal(cut.coefficients, made.coefficients[:, :4])
+    assert (cut.degree, cut.num_points) == (1, V)
+    cast = made.astype(np.float32)
+    for array in (cast.coefficients, cast.positions, cast.normals):
+        assert array.dtype == np.float32
+    assert cast.neighbors is made.neighbors
+    assert cast.dtype == np.float32
+    with pytest.raises(ValueError, match="at most the transfer's, 2, got 3"):
+        made.truncated(3)
+
+
+def test_every_form_is_shaded_the_same(rng):
+    made, light = transfer(rng), jnp.asarray(rng.normal(size=(3, K)))
+    plain = shade_diffuse(light, made, 0.5)
+    np.testing.assert_allclose(shade_diffuse(light, sample(made), 0.5), plain, atol=1e-14)
+    own = rng.normal(size=(V, 3, K))
+    np.testing.assert_allclose(
+        shade_diffuse(own, sample(made), 0.5), shade_diffuse(own, made, 0.5), atol=1e-14
+    )

@@ -11,16 +11,16 @@ from jax.test_util import check_grads
 
 from jaxsh import harmonics
 from jaxsh.transfer import (
-    LightProduct,
     Material,
     Transfer,
-    light_product,
+    fixed_light,
+    reflected_direction,
     sample,
     shade_diffuse,
     shade_glossy,
+    unshadowed,
 )
-from jaxsh.transfer._lobe import lobe, lobe_polynomial
-from jaxsh.transfer._nodes import product_nodes
+from jaxsh.transfer._glossy_kernels import lobe, lobe_polynomial, product_nodes
 
 V, DEGREE, K = 7, 3, 16
 leggauss = functools.lru_cache(np.polynomial.legendre.leggauss)
@@ -84,12 +84,12 @@ def test_glossy_equals_quadrature(rng, dtype, rtol, normalized):
     made, light = surface(rng, dtype), rng.normal(size=(3, K))
     material = Material(rng.uniform(size=3), rng.uniform(size=(V, 3)), rng.uniform(1, 60, size=V))
     exact = by_quadrature(light, made, mirrored(EYE, made), material, normalized=normalized)
-    for transfer, given in (
-        (made, light),
-        (sample(made), light),
-        (light_product(jnp.asarray(light, dtype), made), None),
+    still = fixed_light(jnp.asarray(light, dtype), made)
+    for got in (
+        shade_glossy(light, made, EYE, material, normalized=normalized),
+        shade_glossy(light, sample(made), EYE, material, normalized=normalized),
+        still(EYE, material, normalized=normalized),
     ):
-        got = shade_glossy(given, transfer, EYE, material, normalized=normalized)
         assert got.dtype == dtype
         np.testing.assert_allclose(got, exact, rtol=0, atol=rtol * np.abs(exact).max())
 
@@ -101,7 +101,7 @@ def test_everything_is_cut_to_the_light_s_degree(rng, light_degree):
     got = [
         shade_glossy(light, made, EYE, MATERIAL),
         shade_glossy(light, sample(made, light_degree), EYE, MATERIAL),
-        shade_glossy(None, light_product(light, made), EYE, MATERIAL),
+        fixed_light(light, made)(EYE, MATERIAL),
     ]
     for one in got:
         np.testing.assert_allclose(one, exact, rtol=0, atol=1e-12 * np.abs(exact).max())
@@ -143,8 +143,7 @@ def test_lights_in_batches_and_of_their_own(rng, lights):
 def test_a_mesh_of_more_than_a_tile(rng):
     made, light = surface(rng, count=1030, degree=1), rng.normal(size=(3, 4))
     exact = by_quadrature(light, made, mirrored(EYE, made), MATERIAL)
-    for transfer, given in ((made, light), (light_product(light, made), None)):
-        got = shade_glossy(given, transfer, EYE, MATERIAL)
+    for got in (shade_glossy(light, made, EYE, MATERIAL), fixed_light(light, made)(EYE, MATERIAL)):
         np.testing.assert_allclose(got, exact, rtol=0, atol=1e-12 * np.abs(exact).max())
 
 
@@ -198,18 +197,17 @@ def test_where_there_is_no_direction_the_value_is_finite(rng):
     np.testing.assert_array_equal(behind, shade_glossy(light, turned, EYE, MATERIAL)[:2])
 
 
-@pytest.mark.parametrize("form", ["sampled", "light product"])
+@pytest.mark.parametrize("form", ["sampled", "fixed light"])
 def test_glossy_derivatives(rng, form):
     made, light = surface(rng, degree=2, count=3), jnp.asarray(rng.normal(size=(3, 9)))
 
     def shade(light, coefficients, normals, eye, specular, exponent):
         arrays = coefficients, made.positions, normals, made.neighbors
         transfer = Transfer(*map(jnp.asarray, arrays))
-        if form == "sampled":
-            transfer = sample(transfer)
-        if form == "light product":
-            transfer, light = light_product(light, transfer), None
-        return shade_glossy(light, transfer, eye, Material(0.3, specular, exponent))
+        material = Material(0.3, specular, exponent)
+        if form == "fixed light":
+            return fixed_light(light, transfer)(eye, material)
+        return shade_glossy(light, sample(transfer), eye, material)
 
     arguments = (
         light,
@@ -294,7 +292,6 @@ def test_frames_share_one_program(rng):
         ((3, 8), (3,), MATERIAL, "got 8"),
         ((3, 25), (3,), MATERIAL, r"light's degree 4 is above the transfer's, 3; .*\.\.\., :16\]"),
         ((3, 16), (2, 3), MATERIAL, r"expected eye \(3,\), got shape \(2, 3\)"),
-        (None, (3,), MATERIAL, "only a LightProduct holds its own"),
         (
             (3, 16),
             (3,),
@@ -304,20 +301,41 @@ def test_frames_share_one_program(rng):
     ],
 )
 def test_bad_glossy_arguments_are_refused(unchecked, rng, light, eye, material, message):
-    light = None if light is None else np.ones(light)
     with pytest.raises(ValueError, match=message):
-        shade_glossy(light, surface(rng), np.ones(eye), material)
+        shade_glossy(np.ones(light), surface(rng), np.ones(eye), material)
 
 
-def test_other_degrees_and_second_lights_are_refused(unchecked, rng):
+def test_other_degrees_and_lights_of_their_own_are_refused(unchecked, rng):
     made = surface(rng)
     with pytest.raises(ValueError, match="sampled transfer's degree, 3, got 2; sample the transf"):
         shade_glossy(np.ones((3, 9)), sample(made), EYE, MATERIAL)
     with pytest.raises(ValueError, match="at most the transfer's, 3, got 4"):
         sample(made, 4)
     with pytest.raises(ValueError, match=r"one light \(3, K\) for all vertices"):
-        light_product(np.ones((1, 3, 9)), made)
-    product = light_product(np.ones((3, 9)), made)
-    assert isinstance(product, LightProduct)
-    with pytest.raises(ValueError, match="holds its light: expected light None"):
-        shade_glossy(np.ones((3, 9)), product, EYE, MATERIAL)
+        fixed_light(np.ones((1, 3, 9)), made)
+    with pytest.raises(ValueError, match=r"expected eye \(3,\), got shape \(2, 3\)"):
+        fixed_light(np.ones((3, 9)), made)(np.ones((2, 3)), MATERIAL)
+    with pytest.raises(ValueError, match=r"positions and normals \(V, 3\), got shapes \(7, 3\)"):
+        reflected_direction(EYE, made.positions, made.normals[:2])
+
+
+def test_reflected_directions_are_those_of_a_mirror(rng):
+    made = surface(rng)
+    got = reflected_direction(EYE, made.positions, 3 * made.normals)
+    np.testing.assert_allclose(got, mirrored(EYE, made), atol=1e-14)
+    far = reflected_direction(EYE, made.positions, made.normals, distant=True)
+    at_origin = eqx.tree_at(lambda t: t.positions, made, 0 * made.positions)
+    np.testing.assert_allclose(far, mirrored(EYE, at_origin), atol=1e-14)
+
+
+def test_the_cosine_of_the_transfer_stays_in_the_glossy_part():
+    """Light 1 from everywhere, in nothing's way: what the docstring says is left of the mean."""
+    exponent, degree = 32.0, 24
+    angles = np.radians([0.0, 30.0, 60.0])
+    normals = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], axis=1)
+    light = jnp.zeros((3, (degree + 1) ** 2)).at[:, 0].set(np.sqrt(4 * np.pi))
+    up = np.array([0, 0, 1.0])
+    made, mirror = unshadowed(0 * normals, normals, degree), Material(0.0, 1.0, exponent)
+    left = shade_glossy(light, made, up, mirror, distant=True)[:, 0]
+    np.testing.assert_allclose(left[0], (exponent + 1) / (exponent + 2), atol=1e-4)
+    np.testing.assert_allclose(left, np.cos(angles), atol=0.035)

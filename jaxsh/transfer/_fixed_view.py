@@ -1,4 +1,4 @@
-"""The product of one eye, the material and the transfer: what stays while only the light turns."""
+"""Glossy shading for a fixed eye: transfer times lobe, computed once, times light after light."""
 
 import functools
 import math
@@ -8,18 +8,16 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_degree
+from .._core.checks import as_float
 from .._core.linalg import tall_product
 from ..harmonics import degree_of, num_coefficients
-from ._checks import checked_eye, checked_material
-from ._lobe import lobe_polynomial, reflected
-from ._lobe_products import lobe_products
-from ._material import Material
-from ._transfer import Transfer
+from ._glossy_kernels import lobe_polynomial, lobe_products
+from ._material import Material, checked_eye, checked_material
+from ._transfer import Transfer, checked_degree
 
 
-class EyeProduct(eqx.Module):
-    """What V vertices send to one eye of the light around them: made by `eye_product`.
+class FixedView(eqx.Module):
+    """Maps a light to the radiance that V vertices send to one eye: made by `fixed_view`.
 
     `coefficients` are (V, K), or (V, 3, K) where an albedo differs between the channels. Their
     product with those of a light is radiance.
@@ -32,22 +30,22 @@ class EyeProduct(eqx.Module):
         return degree_of(self.coefficients.shape[-1])
 
     def __call__(self, light: Float[ArrayLike, "... 3 k"]) -> Float[Array, "... v 3"]:
-        """Radiance (..., V, 3) that leaves each vertex towards the eye: `shade_glossy` of a light.
+        """Compute the radiance (..., V, 3) towards the eye, as `shade_glossy` does.
 
-        `light` (..., 3, K) is of the product's degree, since `shade_glossy` cuts every function to
+        `light` (..., 3, K) is of the view's degree, since `shade_glossy` cuts every function to
         the light's. All vertices share it: axes in front are a batch of lights, and none of them
         stands for the vertices. Bilinear and differentiable. Raises `ValueError` for other shapes.
         """
         light, width = as_float(light), self.coefficients.shape[-1]
         if light.shape[-2:] != (3, width):
             raise ValueError(
-                f"expected light (..., 3, {width}), of the product's degree {self.degree}, got "
+                f"expected light (..., 3, {width}), of the view's degree {self.degree}, got "
                 f"shape {light.shape}"
             )
         return _shade(self.coefficients, light.astype(self.coefficients.dtype))
 
 
-def eye_product(
+def fixed_view(
     transfer: Transfer,
     eye: Float[ArrayLike, " 3"],
     material: Material,
@@ -55,8 +53,8 @@ def eye_product(
     degree: int | None = None,
     distant: bool = False,
     normalized: bool = True,
-) -> EyeProduct:
-    """All that glossy shading does but to multiply with the light, for one eye.
+) -> FixedView:
+    """Compute once all of glossy shading but the product with the light, for one eye.
 
     `shade_glossy` is linear in the light: Σ_k L_k G_k, where G are the coefficients, at the
     light's degree, of the transfer times ρ_d/π + ρ_s lobe(B·ω). The integral of G with any light
@@ -69,33 +67,40 @@ def eye_product(
     - `transfer`: cut to `degree` (default: all of it), that of the lights to come.
     - `eye`, `material`, `distant`, `normalized`: as for `shade_glossy`.
 
-    Differentiable in all arguments, forward and reverse. Raises `ValueError` for shapes that do
-    not fit, and for a degree that the transfer does not have.
+    **Returns** a `FixedView`, to be called with a light (..., 3, K). Differentiable in all
+    arguments, forward and reverse. Raises `ValueError` for shapes that do not fit, and for a
+    degree that the transfer does not have.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> made, mirror = transfer.unshadowed(up, up, degree=1), transfer.Material(0.5, 0.5, 8.0)
+    >>> view = transfer.fixed_view(made, jnp.asarray([0.0, 0.0, 5.0]), mirror)
+    >>> view(jnp.ones((3, 4))).shape
+    (1, 3)
     """
-    count, dtype = len(transfer.positions), transfer.positions.dtype
+    count, dtype = transfer.num_points, transfer.dtype
     eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
-    degree = transfer.degree if degree is None else check_degree(degree)
-    if degree > transfer.degree:
-        raise ValueError(
-            f"expected a degree of at most the transfer's, {transfer.degree}, got {degree}"
-        )
-    return EyeProduct(_eye_product(transfer, eye, material, degree, distant, normalized))
+    degree = checked_degree(transfer, degree)
+    return FixedView(_fixed_view(transfer, eye, material, degree, distant, normalized))
 
 
 @functools.partial(jax.jit, static_argnames=("degree", "distant", "normalized"))
-def _eye_product(transfer, eye, material, degree, distant, normalized):
-    axis = reflected(eye, transfer.positions, transfer.normals, distant)
+def _fixed_view(transfer, eye, material, degree, distant, normalized):
+    axis = transfer.reflections(eye, distant)
     lobes = lobe_polynomial(material.exponent, degree, normalized)
     unit_lights = jnp.eye(num_coefficients(degree), dtype=axis.dtype)
     glossy = lobe_products(unit_lights, transfer, axis, lobes)
-    diffuse = transfer.coefficients[:, None, : len(unit_lights)]
+    diffuse = transfer.vectors(len(unit_lights))[:, None]
     coefficients = _column(material.diffuse / math.pi) * diffuse
     coefficients += _column(material.specular) * glossy.T[:, None]
     return coefficients[:, 0] if coefficients.shape[1] == 1 else coefficients
 
 
 def _column(albedo: Float[Array, "..."]) -> Float[Array, "vertices channels 1"]:
-    """An albedo beside coefficients, with axes of length 1 for what it does not depend on."""
+    """Aligns an albedo with coefficients: axes of length 1 for what it does not depend on."""
     return jnp.atleast_2d(albedo)[..., None]
 
 
