@@ -24,8 +24,8 @@ def glass(
     toward = camera.position - camera.target
     toward = (toward / jnp.linalg.norm(toward)).astype(view.mesh.normals.dtype)
     facing = jnp.clip(view.mesh.normals @ toward, 0, 1)[:, None]
-    grey = imaging.interpolate(view.raster, view.mesh.faces, 0.02 + 0.25 * facing**2)
+    grey = imaging.interpolate(view.raster, 0.02 + 0.25 * facing**2)
     raster = imaging.rasterize(dots, camera, samples=samples)
     color = jnp.broadcast_to(jnp.asarray(_YELLOW, grey.dtype), (len(dots.vertices), 3))
-    image = imaging.interpolate(raster, dots.faces, color, jnp.repeat(grey, 3, axis=-1))
+    image = imaging.interpolate(raster, color, jnp.repeat(grey, 3, axis=-1))
     return np.asarray(imaging.tone_map(image))

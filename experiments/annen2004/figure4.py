@@ -140,7 +140,7 @@ def _lamp(
     mesh = geometry.Mesh(light.vertices, faces, jnp.zeros_like(light.vertices))
     raster = imaging.rasterize(mesh, camera, samples=config.samples)
     glow = jnp.broadcast_to(light.radiance[None], light.vertices.shape)
-    return imaging.interpolate(raster, faces, glow, GROUND)
+    return imaging.interpolate(raster, glow, GROUND)
 
 
 def _row(config: Figure4, view: View, place: Place) -> dict[str, Any]:

@@ -90,7 +90,7 @@ class Frame(NamedTuple):
             expansion = timed("project", midrange.taylor, cube, config.degree, order)
             shaded = timed("shade", midrange.shade, expansion, subject.baked, config.albedo)
         raster = timed("raster", self._raster)
-        timed("draw", _develop, raster, subject.mesh.faces, shaded, self.exposure)
+        timed("draw", _develop, raster, shaded, self.exposure)
         return seconds
 
     def _raster(self) -> imaging.Raster:
@@ -102,8 +102,8 @@ class Frame(NamedTuple):
 
 
 @jax.jit
-def _develop(raster, faces, shaded, exposure):
-    return imaging.tone_map(imaging.interpolate(raster, faces, shaded), exposure)
+def _develop(raster, shaded, exposure):
+    return imaging.tone_map(imaging.interpolate(raster, shaded), exposure)
 
 
 @experiment("annen2004.table1")

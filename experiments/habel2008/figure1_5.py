@@ -243,9 +243,9 @@ def _render(config: Figure15, scene: Scene, sun) -> tuple[Float[Array, "h w 3"],
     height, width = scene.raster.shape
     n = scene.raster.samples
     direct = (facing * lit).reshape(height, n, width, n).mean(axis=(1, 3))
-    paint = imaging.interpolate(scene.raster, scene.mesh.faces, scene.albedo)
+    paint = imaging.interpolate(scene.raster, scene.albedo)
     behind = _backdrop(config, scene, sun).reshape(height, width, 3)
-    sky_part = imaging.interpolate(scene.raster, scene.mesh.faces, shaded, jnp.asarray(behind))
+    sky_part = imaging.interpolate(scene.raster, shaded, jnp.asarray(behind))
     strength = jnp.asarray(_sun_irradiance(config, sun) / np.pi, jnp.float32)
     image = (
         jnp.maximum(sky_part, 0)

@@ -61,7 +61,7 @@ def draw_sky(
     """Columns: noise. Rows: the mesh as observed, the dome of the sky recovered from it."""
     camera = imaging.Camera.facing(mesh, width=height, height=height)
     raster = imaging.rasterize(mesh, camera, samples=2)
-    first = imaging.interpolate(raster, mesh.faces, cases[0].observed)
+    first = imaging.interpolate(raster, cases[0].observed)
     exposure = float(imaging.auto_exposure(first, raster.mask))
     figure, axes = plt.subplots(
         2,
@@ -71,7 +71,7 @@ def draw_sky(
         squeeze=False,
     )
     for (above, below), case in zip(axes.T, cases, strict=True):
-        image = imaging.interpolate(raster, mesh.faces, case.observed, 1 / exposure)
+        image = imaging.interpolate(raster, case.observed, 1 / exposure)
         above.imshow(imaging.tone_map(image, exposure))
         above.set_title(f"noise {100 * case.noise:g} %", fontsize=10)
         _draw_dome(below, case.found.value, sun)

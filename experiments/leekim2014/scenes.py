@@ -117,7 +117,7 @@ class Scene(NamedTuple):
 
     def picture(self, color: Float[Array, "v 3"]) -> Float[Array, "h w 3"]:
         """Linear, clipped, in front of black."""
-        return jnp.clip(imaging.interpolate(self.raster, self.mesh.faces, color), 0, 1)
+        return jnp.clip(imaging.interpolate(self.raster, color), 0, 1)
 
     def quality(self, color: Float[Array, "v 3"], reference: Float[Array, "v 3"]) -> Quality:
         """How far colours are from others."""

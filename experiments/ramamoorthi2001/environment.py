@@ -60,7 +60,7 @@ class View(NamedTuple):
 
     def render(self, irradiance: Float[Array, "v 3"]) -> Float[Array, "h w 3"]:
         """Outgoing radiance of a diffuse surface, albedo/π · E."""
-        return imaging.interpolate(self.raster, self.mesh.faces, ALBEDO / np.pi * irradiance)
+        return imaging.interpolate(self.raster, ALBEDO / np.pi * irradiance)
 
 
 class Shot(NamedTuple):

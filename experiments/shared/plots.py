@@ -45,12 +45,12 @@ class View(NamedTuple):
     ) -> "View":
         """Exposed so that the 99th percentile of the object's pixels under the reference is 1."""
         raster = imaging.rasterize(mesh, camera, samples=samples)
-        seen = imaging.interpolate(raster, mesh.faces, reference)
+        seen = imaging.interpolate(raster, reference)
         return cls(mesh, raster, float(imaging.auto_exposure(seen, raster.mask)))
 
     def render(self, values: Float[Array, "v 3"], behind: Behind = 0.0) -> Float[Array, "h w 3"]:
         """Exposed radiance of the pixels, linear, before what is behind."""
-        return imaging.interpolate(self.raster, self.mesh.faces, self.exposure * values, behind)
+        return imaging.interpolate(self.raster, self.exposure * values, behind)
 
     def shown(
         self, values: Float[Array, "v 3"], behind: Behind = GROUND

@@ -134,7 +134,7 @@ def _draw(
     pictures = []
     for name, environment in environments.items():
         renders = {
-            variant: imaging.interpolate(raster, subject.mesh.faces, shaded)
+            variant: imaging.interpolate(raster, shaded)
             for variant, shaded in _radiance(config, subject, lights[name]).items()
         }
         exposure = float(imaging.auto_exposure(renders["shadowed"], raster.mask))

@@ -1,6 +1,7 @@
 """Control over what XLA fuses and in what pieces it computes."""
 
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -61,7 +62,7 @@ def in_blocks(function, *arrays, size: int):
     return jax.lax.platform_dependent(*arrays, cpu=blocks, default=function)
 
 
-def keep_rows(function, *arguments, like, axis: int, out):
+def keep_rows(function, *arguments, like, axis: int, out) -> Any:
     """`function(*arguments)`, with the rows of its results sharded as those of `like` are.
 
     JAX refuses some operations on arrays with explicit axes, where it cannot tell how their

@@ -30,13 +30,13 @@ def knot(vertices: int = 20_000) -> Mesh:
     t = np.interp(np.arange(along) / along * length[-1], length, fine)
 
     # The torus gives a frame that closes: its normal at the curve, and what is square to both.
-    centre, outward = _curve(t)
+    center, outward = _curve(t)
     tangent = _unit(_curve(t + 1e-5)[0] - _curve(t - 1e-5)[0])
     outward = _unit(outward - (outward * tangent).sum(axis=1, keepdims=True) * tangent)
     side = np.cross(outward, tangent)
     angle = np.arange(around)[:, None] / around * 2 * math.pi
     ring = np.cos(angle) * outward[:, None] + np.sin(angle) * side[:, None]
-    x, y, z = np.moveaxis((centre[:, None] + _PIPE * ring).reshape(-1, 3), 1, 0)
+    x, y, z = np.moveaxis((center[:, None] + _PIPE * ring).reshape(-1, 3), 1, 0)
     points = np.stack([x, -z, y], axis=1)  # the torus lies flat in x and y; stand it up
     points /= np.linalg.norm(points, axis=1).max() * (1 + 1e-6)
 
@@ -48,7 +48,7 @@ def knot(vertices: int = 20_000) -> Mesh:
 
 
 def _curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) of the knot's centre line, and the torus's normals there."""
+    """Points (n, 3) of the knot's center line, and the torus's normals there."""
     u, v = _TURNS * t, _COILS * t
     outward = np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], axis=1)
     ring = np.stack([np.cos(u), np.sin(u), np.zeros_like(u)], axis=1)

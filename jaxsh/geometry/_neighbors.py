@@ -10,9 +10,9 @@ from ._mesh import Mesh
 def neighbors(mesh: Mesh) -> Int[Array, "v n"]:
     """For each vertex the vertices that an edge joins to it, ascending; n is the largest valence.
 
-    A row with fewer than n neighbours is filled up with the vertex itself. So a gather needs no
+    A row with fewer than n neighbors is filled up with the vertex itself. So a gather needs no
     mask, and `active | active[neighbors(mesh)].any(axis=1)` is one step of a breadth-first search
-    (Lee & Kim 2014). Real neighbours are where the entry differs from its row's number.
+    (Lee & Kim 2014). Real neighbors are where the entry differs from its row's number.
 
     int32. Takes any mesh: open, non-manifold, in pieces; `topology` says what it is. The faces
     must be concrete, since n depends on them: call it outside `jit`.

@@ -70,7 +70,7 @@ def topology(mesh: Mesh) -> Topology:
     """Count the boundary, the pieces and the faults of a mesh.
 
     Nothing else in `geometry` looks: an open mesh is as good as a closed one to cast rays at, and
-    a non-manifold one has normals and neighbours too. Faces that name a vertex twice are left
+    a non-manifold one has normals and neighbors too. Faces that name a vertex twice are left
     out. Not differentiable, and not under `jit`: the answer is Python numbers.
     """
     faces = np.asarray(mesh.faces, np.int64)

@@ -22,7 +22,7 @@ class RayTree(NamedTuple):
 
 
 def ray_tree(meshes: list[Mesh]) -> RayTree:
-    """Split the triangles again and again in two halves along the longest extent of their centres.
+    """Split the triangles again and again in two halves along the longest extent of their centers.
 
     Triangles with a NaN or infinite corner are left out, as in Embree; raises `ValueError` where
     none is left. Splits by surface area would spare a ray some boxes, but give a tree of uneven
@@ -37,10 +37,10 @@ def ray_tree(meshes: list[Mesh]) -> RayTree:
     depth = (len(usable) - 1).bit_length()
     leaves = 2**depth
     order = usable[np.arange(leaves) * len(usable) // leaves]
-    centres = corners.mean(axis=1)
+    centers = corners.mean(axis=1)
     for level in range(depth):
         order = order.reshape(2**level, -1)
-        points = centres[order]
+        points = centers[order]
         longest = np.ptp(points, axis=1).argmax(axis=1)
         along = np.take_along_axis(points, longest[:, None, None], axis=2)[:, :, 0]
         halves = np.argpartition(along, along.shape[1] // 2 - 1, axis=1)

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._core.xla import keep_rows
 from ._camera import Camera
 
 
@@ -14,7 +15,7 @@ def look_up(
     """Radiance of a lat-long picture along directions: bilinear, wrapped in φ, whole at the poles.
 
     Directions need no unit length, if their squares stay in range; zero is taken for +z. Between
-    the outermost pixel centres and a pole the look-up runs to the mean of the outermost row, so
+    the outermost pixel centers and a pole the look-up runs to the mean of the outermost row, so
     that the pole has one value from all sides. Has the dtype of `environment`. Linear and
     differentiable in it; in the directions too, with kinks between pixels, where a slope is that
     of one side, and zero slope at the poles.
@@ -24,11 +25,11 @@ def look_up(
             f"expected an environment (height, width, channels) and directions (..., 3), got "
             f"shapes {environment.shape} and {directions.shape}"
         )
-    return _look_up(environment, directions)
+    return keep_rows(_look_up, environment, directions, like=directions, axis=0, out=0)
 
 
 def backdrop(environment: Float[Array, "height width c"], camera: Camera) -> Float[Array, "h w c"]:
-    """The environment as the camera sees it through its pixel centres, for `interpolate`.
+    """The environment as the camera sees it through its pixel centers, for `interpolate`.
 
     Differentiable as `look_up`, in the environment and in the camera.
     """

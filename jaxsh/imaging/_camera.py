@@ -80,7 +80,7 @@ class Camera(eqx.Module):
             -(np.max(a - tan * z) + np.max(-a - tan * z)) / (2 * tan)
             for a, tan in ((x, tan_y * width / height), (y, tan_y))
         )
-        cx, cy = (_centre(a, z - cz) for a in (x, y))
+        cx, cy = (_center(a, z - cz) for a in (x, y))
         position = cx * right + cy * upward + cz * forward
         return cls(
             position=position.astype(np.float32),
@@ -91,7 +91,7 @@ class Camera(eqx.Module):
         )
 
     def rays(self) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
-        """Origins and unit directions through the pixel centres: row by row from the top left.
+        """Origins and unit directions through the pixel centers: row by row from the top left.
 
         n is height · width; dtype that of `position`. Differentiable in every field that is not
         a size.
@@ -118,7 +118,7 @@ def _unit(x: Array) -> Array:
     return x / jnp.linalg.norm(x, axis=-1, keepdims=True)
 
 
-def _centre(x: np.ndarray, depth: np.ndarray) -> float:
+def _center(x: np.ndarray, depth: np.ndarray) -> float:
     """The c from which the outermost (x - c) / depth to both sides are equally far out."""
     c = 0.0
     for _ in range(16):  # finds the two outermost in a few steps, then stays

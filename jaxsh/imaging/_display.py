@@ -10,6 +10,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
 from .._core.linalg import einsum
+from .._core.xla import keep_rows
 
 _LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec. 709
 
@@ -47,7 +48,7 @@ def tone_map(
     (1 + L) and keeps the ratios of R, G, B, which are in the last axis; `white` is the least
     luminance that becomes 1, and with the default, infinity, none does (Reinhard et al. 2002,
     eq. 4 and 3, without the paper's scaling to the picture's key: that is `exposure`). What is
-    still outside [0, 1], as a saturated colour may be, is clipped, negative light before the curve.
+    still outside [0, 1], as a saturated color may be, is clipped, negative light before the curve.
 
     Differentiable in image, exposure and white; the gradient is zero where the result is clipped.
     Raises `ValueError` for an unknown curve, a last axis that is not R, G, B, and, where it is
@@ -93,10 +94,11 @@ def auto_exposure(
     """
     if not 0 <= percentile <= 100:
         raise ValueError(f"percentile must be between 0 and 100, got {percentile}")
-    return _auto_exposure(image, mask, percentile)
+    exposure = functools.partial(_auto_exposure, percentile=percentile)
+    return keep_rows(exposure, image, mask, like=image, axis=0, out=None)
 
 
-@functools.partial(jax.jit, static_argnums=2)
+@functools.partial(jax.jit, static_argnames="percentile")
 def _auto_exposure(image, mask, percentile: float) -> Float[Array, ""]:
     brightest = jnp.max(image, axis=-1)
     if mask is not None:

@@ -31,16 +31,16 @@ def read_environment(
 
     The result is a lat-long picture in our orientation, whatever the file's: row 0 touches +z,
     column 0 starts at φ = 0 (+x), φ grows to the right, towards +y. Values are taken as linear
-    Rec. 709; colours are not converted, and an .hdr header's EXPOSURE or a .pfm header's scale is
-    not applied. A grey picture gives three equal channels; channels other than R, G, B are left
+    Rec. 709; colors are not converted, and an .hdr header's EXPOSURE or a .pfm header's scale is
+    not applied. A gray picture gives three equal channels; channels other than R, G, B are left
     out.
 
     Layouts and their orientations (`docs/conventions.md` has the table with each one's axes):
 
     - "lat-long", 2 : 1: "jaxsh"; "mitsuba", "nvdiffrec" (y-up, turned as in `read_mesh(up="y")`);
-      "blender"; "debevec" (a panorama seen from inside, its centre at -x).
+      "blender"; "debevec" (a panorama seen from inside, its center at -x).
     - "angular-map", 1 : 1, Debevec's light probe: the direction at an angle of π·r from forward
-      is at radius r, 1 at the circle. "jaxsh": forward, the picture's centre, at -x, its right at
+      is at radius r, 1 at the circle. "jaxsh": forward, the picture's center, at -x, its right at
       +y, its up at +z. "-z", "+z": y-up axes with forward at -z or +z and +x to the right;
       "+z" is Debevec's formula r = acos(z)/π, which mirrors a scene in right-handed axes.
     - "horizontal-cross", 4 : 3, "vertical-cross", 3 : 4: forward in the middle; the vertical one

@@ -2,7 +2,7 @@
 
 Each layout becomes tiles with a border of one pixel, so that bilinear look-up needs no cases, and
 a function from directions to places on them. Directions are along the picture's own axes: to its
-right, up, and towards its centre; for the cube, the x, y and z of its face table.
+right, up, and towards its center; for the cube, the x, y and z of its face table.
 """
 
 from collections.abc import Callable
@@ -47,7 +47,7 @@ class Tiles(NamedTuple):
 
     pixels: Float[np.ndarray, "tiles h w 3"]  # with a border of one pixel
     around: int  # pixels on a great circle
-    # x, y, z of directions of any length -> tile, row and column, 0 at the first pixel's centre
+    # x, y, z of directions of any length -> tile, row and column, 0 at the first pixel's center
     locate: Callable[[np.ndarray, np.ndarray, np.ndarray], Places]
 
 
@@ -116,22 +116,22 @@ def _lat_long(image: np.ndarray) -> Tiles:
 
 
 def _radius(size: int) -> np.ndarray:
-    """Of the pixels' centres in an angular map, 1 on its circle."""
-    centre = (2 * np.arange(size) + 1) / size - 1
-    return np.hypot(centre[:, None], centre)
+    """Of the pixels' centers in an angular map, 1 on its circle."""
+    center = (2 * np.arange(size) + 1) / size - 1
+    return np.hypot(center[:, None], center)
 
 
 def _angular_map(image: np.ndarray) -> Tiles:
-    """Debevec's light probe: at radius acos(z)/π from the centre, z along the forward axis."""
+    """Debevec's light probe: at radius acos(z)/π from the center, z along the forward axis."""
     size = len(image)
     # The whole circle is one direction, straight back: what lies outside is taken from inside,
     # a pixel's half diagonal from the circle.
-    centre = (2 * np.arange(-1, size + 1) + 1) / size - 1
-    radius = np.hypot(centre[:, None], centre)
+    center = (2 * np.arange(-1, size + 1) + 1) / size - 1
+    radius = np.hypot(center[:, None], center)
     inwards = np.where(radius > 1, max(0.0, 1 - np.sqrt(2) / size) / np.maximum(radius, 1), 1)
     row, column = (
         np.clip(np.floor((p * inwards + 1) / 2 * size), 0, size - 1).astype(int)
-        for p in (centre[:, None], centre)
+        for p in (center[:, None], center)
     )
     pixels = image[row, column]
 
@@ -158,9 +158,9 @@ def _cube(faces: Float[np.ndarray, "6 n n 3"]) -> Tiles:
         v = np.choose(side, (-y, z * sign, -y)) / size
         return 2 * side + behind, (v + 1) / 2 * n - 0.5, (u + 1) / 2 * n - 0.5
 
-    # The border of a face is what its neighbours show there.
-    centre = ((2 * np.arange(-1, n + 1) + 1) / n - 1).astype(np.float32)
-    v, u = (grid.ravel() for grid in np.meshgrid(centre, centre, indexing="ij"))
+    # The border of a face is what its neighbors show there.
+    center = ((2 * np.arange(-1, n + 1) + 1) / n - 1).astype(np.float32)
+    v, u = (grid.ravel() for grid in np.meshgrid(center, center, indexing="ij"))
     border = np.maximum(np.abs(u), np.abs(v)) > 1
     pixels = np.pad(faces, ((0, 0), (1, 1), (1, 1), (0, 0)))
     for face, (along, right, down) in enumerate(_FACES):

@@ -3,15 +3,15 @@
 import numpy as np
 from jaxtyping import Float
 
-# For each layout and orientation, where the picture's right, up and centre ("forward") land.
+# For each layout and orientation, where the picture's right, up and center ("forward") land.
 # For the cube, where the x, y and z of its face table land.
 #
 # Right-handed y-up axes are turned like the vertices of `read_mesh(path, up="y")`, (x, y, z) ->
 # (x, -z, y), so that a scene's light and meshes stay together. Sources:
-# - mitsuba: Mitsuba 3, `direction_to_uv` in src/emitters/envmap.cpp: y up, centre +z, right -x
-# - nvdiffrec: `latlong_to_cubemap` in render/util.py: y up, centre -z, right +x; also the lat-long
+# - mitsuba: Mitsuba 3, `direction_to_uv` in src/emitters/envmap.cpp: y up, center +z, right -x
+# - nvdiffrec: `latlong_to_cubemap` in render/util.py: y up, center -z, right +x; also the lat-long
 #   files of the USC high-resolution light probe page
-# - blender: `direction_to_equirectangular` in Cycles' kernel: z up as here, centre +x, right -y
+# - blender: `direction_to_equirectangular` in Cycles' kernel: z up as here, center +x, right -y
 # - -z, +z: the text and the formula of Debevec's light probe gallery, which do not agree
 # - opengl, direct3d: the same face table in right-handed and in left-handed y-up axes
 _DEBEVEC = {"jaxsh": "+y +z -x", "-z": "+x +z +y", "+z": "+x +z -y"}
@@ -57,7 +57,7 @@ def turn_columns(
     """
     width = image.shape[1]
     right, forward = (np.arctan2(axis[1], axis[0]) for axis in (axes[0], axes[2]))
-    # The centre, at half the width, goes to φ = forward.
+    # The center, at half the width, goes to φ = forward.
     if np.sin(right - forward) < 0:  # φ falls to the right
         image = image[:, ::-1]
     columns = width * (forward - np.pi) / (2 * np.pi)

@@ -91,11 +91,11 @@ def _check_form(spec: Any, size: int) -> None:
 
 
 def _channels(names: list[str]) -> list[int]:
-    """Where R, G, B are; one grey channel stands for all three."""
+    """Where R, G, B are; one gray channel stands for all three."""
     found = {name.upper(): i for i, name in reversed(list(enumerate(names)))}
     if all(c in found for c in "RGB"):
         return [found[c] for c in "RGB"]
-    colours = [i for i, name in enumerate(names) if name.upper() not in ("A", "Z")]
-    if len(colours) == 1:
-        return colours * 3
+    colors = [i for i, name in enumerate(names) if name.upper() not in ("A", "Z")]
+    if len(colors) == 1:
+        return colors * 3
     raise ValueError(f"needs channels R, G, B or a single one, got {names}")

@@ -1,4 +1,4 @@
-"""Which face a pixel sees, and colours from vertices to pixels."""
+"""Which face each pixel sees, and colors carried from vertices to pixels."""
 
 import dataclasses
 import functools
@@ -8,10 +8,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Bool, Float, Int
 
+from .._core.checks import is_concrete
 from .._core.linalg import einsum
+from .._core.xla import keep_rows
 from ..geometry import Mesh, RayScene, ray_scene
 from ._camera import Camera
 
@@ -19,13 +20,14 @@ _rays = eqx.filter_jit(Camera.rays)
 
 
 class Raster(eqx.Module):
-    """What the samples of each pixel see of a mesh: n × n of them, for a picture of h × w.
+    """Holds what the samples of each pixel see of a mesh: n × n of them, for a picture of h × w.
 
-    With one sample, its pixel's centre, the rows and columns are those of the picture.
+    With one sample, its pixel's center, the rows and columns are those of the picture.
     """
 
-    face: Int[Array, "hn wn"]  # index into the mesh's faces, -1 for background; int32
+    face: Int[Array, "hn wn"]  # index into `faces`, -1 for background; int32
     barycentric: Float[Array, "hn wn 3"]  # of the face's vertices, 0 for background; float32
+    faces: Int[Array, "f 3"]  # the mesh's
     samples: int = eqx.field(static=True, default=1)  # n
 
     @property
@@ -36,7 +38,7 @@ class Raster(eqx.Module):
 
     @property
     def alpha(self) -> Float[Array, "h w"]:
-        """The share of a pixel's samples that are on the object; float32."""
+        """Share of each pixel's samples that are on the object; float32."""
         return _alpha(self.face, self.samples)
 
     @property
@@ -48,13 +50,24 @@ class Raster(eqx.Module):
 def rasterize(
     mesh: Mesh, camera: Camera, *, samples: int = 1, scene: RayScene | None = None
 ) -> Raster:
-    """The first face on the rays through each pixel, and where on it they arrive.
+    """Find the first face on the rays through each pixel, and where on it they arrive.
 
-    `samples` rays along each side of a pixel, on a regular grid: one is its centre, n give pictures
+    `samples` rays along each side of a pixel, on a regular grid: one is its center, n give pictures
     n² + 1 shades of a silhouette and take n² times the memory. Exact at the samples (weights are
-    those in space, so perspective is right). Runs through a `RayScene`: neither traceable nor
-    differentiable. Frame after frame of a mesh at rest, give its `ray_scene(mesh)` as `scene`, so
-    that its tree is built once. Raises `ValueError` for samples below 1.
+    those in space, so perspective is right). Frame after frame of a mesh at rest, give its
+    `geometry.ray_scene(mesh)` as `scene`, so that its tree is built once.
+
+    Runs on the host through a `RayScene`, outside `jit`, and does not shard. Not differentiable:
+    which face is seen is a step. Raises `ValueError` for samples below 1.
+
+    **Example**
+
+    >>> from jaxsh import geometry, imaging
+    >>> mesh = geometry.knot(300)
+    >>> camera = imaging.Camera.facing(mesh, width=8, height=6)
+    >>> raster = imaging.rasterize(mesh, camera, samples=2)
+    >>> raster.shape, raster.face.shape, raster.barycentric.shape
+    ((6, 8), (12, 16), (12, 16, 3))
     """
     if operator.index(samples) < 1:
         raise ValueError(f"a pixel needs at least 1 sample along its side, got {samples}")
@@ -65,55 +78,71 @@ def rasterize(
     return Raster(
         jnp.asarray(hit.face.reshape(shape)),
         jnp.asarray(hit.barycentric.reshape(*shape, 3)),
+        jnp.asarray(mesh.faces),
         samples,
     )
 
 
 def interpolate(
     raster: Raster,
-    faces: Int[Array, "f 3"],
     values: Float[Array, "v c"],
     background: float | Float[Array, " c"] | Float[Array, "h w c"] = 0.0,
 ) -> Float[Array, "h w c"]:
-    """Values at vertices (colours, positions, normals) carried linearly over the faces to pixels.
+    """Carry values at vertices (colors, positions, normals) linearly over the faces to pixels.
 
     A pixel is the mean over its samples; those beside the object count as `background`, a number,
-    a colour or a picture (as from `backdrop`). Give linear radiance: a mean of encoded colours is
-    no light. Has the dtype of `values`. Differentiable, forward and reverse, in `values`,
-    `background` and the raster's weights; `jit` and `vmap` as you like.
+    a color or a picture (as from `backdrop`). Give linear radiance: the mean of encoded colors is
+    not the color of the mean light. Has the dtype of `values`. Raises `ValueError` for values of
+    another shape or of too few vertices, and for a background of another shape.
+
+    Differentiable, forward and reverse, in `values`, `background` and the raster's weights. Runs
+    under `jit` and `vmap`; shards over the raster's rows, where `values` are whole on each device.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import geometry, imaging
+    >>> mesh = geometry.knot(300)
+    >>> raster = imaging.rasterize(mesh, imaging.Camera.facing(mesh, width=8, height=6))
+    >>> imaging.interpolate(raster, 0.5 * mesh.normals + 0.5, jnp.nan).shape
+    (6, 8, 3)
     """
     if values.ndim != 2:
         raise ValueError(f"expected values (v, c), one row per vertex, got shape {values.shape}")
-    if not isinstance(faces, Tracer) and len(faces):
-        vertices = int(np.max(np.asarray(faces))) + 1
+    if is_concrete(raster.faces) and len(raster.faces):
+        vertices = int(np.max(np.asarray(raster.faces))) + 1
         if vertices > len(values):
             raise ValueError(f"expected values for {vertices} vertices, got {len(values)}")
     behind = jnp.asarray(background, values.dtype)
     shape = (*raster.shape, values.shape[1])
     if behind.ndim > 1 and behind.shape != shape:
         raise ValueError(f"expected a background {shape}, got shape {behind.shape}")
-    return _interpolate(raster, faces, values, behind)
+    return _interpolate(raster, values, behind)
 
 
 @functools.partial(jax.jit, static_argnums=1)
 def _alpha(face: Int[Array, "hn wn"], samples: int) -> Float[Array, "h w"]:
-    return _resolve((face >= 0).astype(jnp.float32)[..., None], samples)[..., 0]
+    on_object = (face >= 0).astype(jnp.float32)[..., None]
+    return keep_rows(lambda x: _resolve(x, samples), on_object, like=face, axis=0, out=0)[..., 0]
 
 
 @jax.jit
-def _interpolate(raster: Raster, faces, values, background):
-    # The background's -1 would be the last face, but its weights are zero.
-    corners = values[faces[jnp.maximum(raster.face, 0)]]
-    weights = raster.barycentric.astype(values.dtype)
-    seen = einsum("hwkc,hwk->hwc", corners, weights)
-    seen = jnp.where((raster.face >= 0)[..., None], seen, 0)
-    pixels = _resolve(seen, raster.samples)
-    free = 1 - raster.alpha[..., None].astype(values.dtype)
-    # A background that is no number, as a mark, stays where it is seen.
-    return pixels + jnp.where(free > 0, free * jnp.broadcast_to(background, pixels.shape), 0)
+def _interpolate(raster: Raster, values, background):
+    def pixels(raster: Raster, values, background):
+        # The background's -1 would be the last face, but its weights are zero.
+        corners = values[raster.faces[jnp.maximum(raster.face, 0)]]
+        weights = raster.barycentric.astype(values.dtype)
+        seen = einsum("hwkc,hwk->hwc", corners, weights)
+        seen = jnp.where((raster.face >= 0)[..., None], seen, 0)
+        seen = _resolve(seen, raster.samples)
+        free = 1 - raster.alpha[..., None].astype(values.dtype)
+        # A background of NaN, as a mark, stays where it is seen.
+        return seen + jnp.where(free > 0, free * jnp.broadcast_to(background, seen.shape), 0)
+
+    return keep_rows(pixels, raster, values, background, like=raster.face, axis=0, out=0)
 
 
 def _resolve(samples: Float[Array, "hn wn c"], n: int) -> Float[Array, "h w c"]:
-    """The mean of each n × n samples."""
+    """Average each n × n samples."""
     height, width, channels = samples.shape
     return jnp.mean(samples.reshape(height // n, n, width // n, n, channels), axis=(1, 3))

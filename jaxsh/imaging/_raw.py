@@ -12,7 +12,7 @@ _PFM = re.compile(rb"P([Ff])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]{1,32})[ \t\r]*
 
 
 def read_pfm(data: bytes) -> Float[np.ndarray, "h w c"]:
-    """A portable float map, colour (PF) or grey (Pf), its rows turned to run downwards.
+    """A portable float map, color (PF) or gray (Pf), its rows turned to run downwards.
 
     The sign of the header's scale says the order of bytes; its size is a unit and is not applied.
     """

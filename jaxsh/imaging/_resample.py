@@ -63,7 +63,7 @@ def _directions(z: np.ndarray, phi: np.ndarray) -> Float[np.ndarray, "3 n"]:
 def _look_up(source: Tiles, directions: Float[np.ndarray, "3 n"]) -> Float[np.ndarray, "n 3"]:
     tile, row, column = source.locate(*directions)
     _, height, width, _ = source.pixels.shape
-    # Rounding may carry a place over the border's centre.
+    # Rounding may carry a place over the border's center.
     i = np.clip(np.floor(row), -1, height - 3)
     j = np.clip(np.floor(column), -1, width - 3)
     down, right = (row - i)[:, None], (column - j)[:, None]

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-# Lobes exp(κ (cos γ - 1)) around a direction: (direction, κ, linear RGB at the centre).
+# Lobes exp(κ (cos γ - 1)) around a direction: (direction, κ, linear RGB at the center).
 _LOBES = (
     ((-0.55, -0.62, 0.56), 600.0, (900.0, 800.0, 640.0)),  # sun: 2.3° to a standard deviation
     ((0.80, -0.50, 0.32), 14.0, (1.9, 2.2, 2.8)),  # softbox: 15°, cool, opposite the sun
@@ -32,7 +32,7 @@ def studio(height: int = 256, width: int = 512) -> Float[Array, "height width 3"
     # The horizon is a soft step, so that it rings no more than a real one.
     above = 1 / (1 + np.exp(-z[..., None] / 0.03))
     radiance = above * sky + (1 - above) * np.array(_GROUND)
-    for direction, kappa, colour in _LOBES:
+    for direction, kappa, color in _LOBES:
         cosine = directions @ (np.array(direction) / np.linalg.norm(direction))
-        radiance = radiance + np.exp(kappa * (cosine - 1))[..., None] * np.array(colour)
+        radiance = radiance + np.exp(kappa * (cosine - 1))[..., None] * np.array(color)
     return jnp.asarray(radiance, jnp.float32)

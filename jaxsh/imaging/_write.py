@@ -14,12 +14,12 @@ def write_image(
     path: str | os.PathLike[str],
     image: Float[Array | np.ndarray, "h w"] | Float[Array | np.ndarray, "h w c"],
 ) -> Path:
-    """Write a picture, grey (h, w), colour (h, w, 3) or with alpha (h, w, 4), as its name says.
+    """Write a picture, gray (h, w), color (h, w, 3) or with alpha (h, w, 4), as its name says.
 
     .png and .jpg take what a screen shows (see `tone_map`), clip it to [0, 1] and round to 8
     bits. .exr and .hdr take linear radiance: .exr keeps float32 exactly (float16 as half), .hdr
     keeps 8 bits of the largest channel and no negative values. .jpg and .hdr have no alpha, and
-    alpha is not multiplied into colours. Makes missing folders and returns the path.
+    alpha is not multiplied into colors. Makes missing folders and returns the path.
 
     Raises `ValueError` for NaN or infinite values, shapes and extensions it does not know, and
     `OSError` where the file cannot be written.
@@ -41,7 +41,7 @@ def write_image(
     if suffix == ".hdr":
         if (pixels < 0).any():
             raise ValueError(f"{path}: an .hdr picture cannot hold negative values")
-        pixels = np.broadcast_to(pixels, (*pixels.shape[:2], 3))  # it knows no grey
+        pixels = np.broadcast_to(pixels, (*pixels.shape[:2], 3))  # it knows no gray
     if suffix in _DISPLAY:
         pixels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
     elif pixels.dtype != np.float16:
@@ -61,7 +61,7 @@ def _write(path: Path, pixels: np.ndarray) -> None:
 
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, _KINDS[pixels.dtype.name])
-    # Colours are not to be touched: not divided by alpha, not thinned out.
+    # Colors are not to be touched: not divided by alpha, not thinned out.
     spec.attribute("oiio:UnassociatedAlpha", 1)
     spec.attribute("jpeg:subsampling", "4:4:4")
     spec.attribute("CompressionQuality", 95)

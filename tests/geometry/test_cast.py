@@ -92,7 +92,7 @@ def test_hits_equal_those_of_the_slow_twin(soup, rng):
 
 
 def inside_rays(mesh, rng):
-    """Origins near the middle, and directions at vertices, edges, centres, axes, anywhere."""
+    """Origins near the middle, and directions at vertices, edges, centers, axes, anywhere."""
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     corners = vertices[faces]
     share = rng.uniform(size=(len(faces), 1)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The neighbour table, and what is said of a mesh that is no closed surface."""
+"""The neighbor table, and what is said of a mesh that is no closed surface."""
 
 import jax
 import jax.numpy as jnp
@@ -28,8 +28,8 @@ def plainly(mesh):
     return np.array(rows, np.int32).reshape(len(beside), width)
 
 
-def fan(count, centre=0, first=1):
-    return [(centre, first + i, first + (i + 1) % count) for i in range(count)]
+def fan(count, center=0, first=1):
+    return [(center, first + i, first + (i + 1) % count) for i in range(count)]
 
 
 MESHES = {
@@ -78,7 +78,7 @@ def test_the_table_drives_a_breadth_first_search():
     assert step(active).all()
 
 
-def test_neighbours_are_mutual():
+def test_neighbors_are_mutual():
     table = np.asarray(neighbors(knot(2000)))
     vertex = np.arange(len(table))[:, None]
     real = table != vertex

@@ -29,7 +29,7 @@ def jaxsh_lat_long(n):
 
 def debevec_lat_long(n):
     theta, turn = _angles(n, 2 * n)
-    return _z_up(theta, 2 * np.pi - turn)  # the centre at -x, a quarter to its right +y
+    return _z_up(theta, 2 * np.pi - turn)  # the center at -x, a quarter to its right +y
 
 
 def mitsuba_lat_long(n):
@@ -167,9 +167,9 @@ AXES = {
 }
 
 
-def coloured_axes(directions):
+def colored_axes(directions):
     """Red, green and blue around +x, +y, +z, their complements opposite; NaN where no picture."""
     unit = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     return sum(
-        np.exp(8 * (unit @ axis - 1))[..., None] * np.array(colour) for axis, colour in AXES.items()
+        np.exp(8 * (unit @ axis - 1))[..., None] * np.array(color) for axis, color in AXES.items()
     )

@@ -12,7 +12,7 @@ from jaxsh.imaging import Camera, backdrop, interpolate, look_up, rasterize
 
 
 def twin(environment, direction):
-    """Bilinear look-up with every neighbour fetched by hand, in float64."""
+    """Bilinear look-up with every neighbor fetched by hand, in float64."""
     environment = np.asarray(environment, np.float64)
     height, width, _ = environment.shape
     x, y, z = np.asarray(direction, np.float64) / np.linalg.norm(direction)
@@ -48,7 +48,7 @@ def test_look_up_is_the_slow_twin(rng, shape):
     np.testing.assert_allclose(batch.reshape(300, 2), found, atol=1e-12)
 
 
-def test_pixel_centres_are_met_exactly(rng):
+def test_pixel_centers_are_met_exactly(rng):
     environment = jnp.asarray(rng.uniform(size=(6, 12, 3)))
     directions = jnp.asarray(painters.jaxsh_lat_long(6))
     np.testing.assert_allclose(look_up(environment, directions), environment, atol=1e-13)
@@ -99,13 +99,13 @@ def test_look_up_differentiates(rng):
 
 def test_backdrop_shows_each_axis_where_the_camera_looks():
     """Also that a picture so drawn is no mirror image: from -y, +x is to the right."""
-    environment = jnp.asarray(painters.coloured_axes(painters.jaxsh_lat_long(64)))
-    for axis, colour in painters.AXES.items():
+    environment = jnp.asarray(painters.colored_axes(painters.jaxsh_lat_long(64)))
+    for axis, color in painters.AXES.items():
         up = (0.0, 0.0, 1.0) if axis[2] == 0 else (0.0, 1.0, 0.0)
         camera = Camera((5.0, 6.0, 7.0), tuple(np.add((5, 6, 7), axis)), up, width=9, height=7)
         view = backdrop(environment, camera)
         assert view.shape == (7, 9, 3)
-        np.testing.assert_allclose(view[3, 4], colour, atol=0.02)
+        np.testing.assert_allclose(view[3, 4], color, atol=0.02)
     wide = Camera((0.0, -2.0, 0.0), (0.0, 0.0, 0.0), fov_y=120.0, width=9, height=9)
     view = backdrop(environment, wide)
     assert view[4, 8, 0] > view[4, 0, 0]  # red +x to the right
@@ -119,12 +119,10 @@ def test_a_mesh_stands_before_its_environment(rng):
     behind = backdrop(environment, camera)
     raster = rasterize(mesh, camera, samples=2)
     white = jnp.ones((len(mesh.vertices), 3), jnp.float32)
-    image = interpolate(raster, mesh.faces, white, behind)
+    image = interpolate(raster, white, behind)
     alpha = np.asarray(raster.alpha)[..., None]
     np.testing.assert_allclose(image, alpha + (1 - alpha) * behind, atol=1e-6)
-    slope = jax.jit(
-        jax.grad(lambda e: interpolate(raster, mesh.faces, white, backdrop(e, camera)).sum())
-    )
+    slope = jax.jit(jax.grad(lambda e: interpolate(raster, white, backdrop(e, camera)).sum()))
     np.testing.assert_allclose(slope(environment).sum(), 3 * (1 - alpha).sum(), rtol=1e-4)
     # In float32 throughout: a camera's, a mesh's and an environment's usual dtype.
     assert image.dtype == behind.dtype == jnp.float32

@@ -1,4 +1,4 @@
-"""The camera, what it sees, and colours from vertices to pixels."""
+"""The camera, what it sees, and colors from vertices to pixels."""
 
 import jax
 import jax.numpy as jnp
@@ -102,7 +102,7 @@ def test_facing_fills_the_picture(width, height, toward):
     raster = rasterize(moved, camera)
     rows, columns = np.nonzero(np.asarray(raster.mask))
     first, last = (rows.min(), columns.min()), (rows.max(), columns.max())
-    # One of the two directions is filled to the last pixel but one, the other is centred.
+    # One of the two directions is filled to the last pixel but one, the other is centered.
     free = np.array([first, (height - 1 - last[0], width - 1 - last[1])])
     assert free.sum(axis=0).min() <= 2
     assert np.abs(free[0] - free[1]).max() <= 2
@@ -123,11 +123,11 @@ def test_a_viewer_in_front_sees_the_front(sheet):
     """From -y: x to the right, z up, and a face that faces -y shows its front."""
     camera = Camera.facing(sheet, toward=(0.0, -1.0, 0.0), width=20, height=20)
     raster = rasterize(sheet, camera)
-    place = np.asarray(interpolate(raster, sheet.faces, sheet.vertices))
+    place = np.asarray(interpolate(raster, sheet.vertices))
     assert place[10, 18, 0] > 0.8
     assert place[10, 1, 0] < -0.8
     assert place[1, 10, 2] > 0.8
-    normal = np.asarray(interpolate(raster, sheet.faces, sheet.normals))
+    normal = np.asarray(interpolate(raster, sheet.normals))
     np.testing.assert_allclose(normal[10, 10], [0, -1, 0], atol=1e-6)
 
 
@@ -148,7 +148,7 @@ def test_the_silhouette_of_a_sphere_is_the_projected_disc():
     assert clear.mean() > 0.98
     np.testing.assert_array_equal(np.asarray(raster.mask)[clear], (sine < 0.25)[clear])
     # Where it is seen, the surface is that of the sphere, and its normal the place.
-    place = np.asarray(interpolate(raster, mesh.faces, mesh.vertices))[np.asarray(raster.mask)]
+    place = np.asarray(interpolate(raster, mesh.vertices))[np.asarray(raster.mask)]
     np.testing.assert_allclose(np.linalg.norm(place, axis=-1), 1, atol=1e-3)
     assert place[:, 1].max() < -0.2
 
@@ -169,7 +169,7 @@ def test_interpolation_is_exact_on_linear_functions_of_place(sheet):
     raster = rasterize(sheet, camera)
     matrix, shift = jnp.array([[1.0, 2, -1], [0.5, 0, 3]]), jnp.array([0.2, -0.3])
     vertices = sheet.vertices.astype(jnp.float64)
-    image = np.asarray(interpolate(raster, sheet.faces, vertices @ matrix.T + shift[None]))
+    image = np.asarray(interpolate(raster, vertices @ matrix.T + shift[None]))
     # The place that a pixel sees, from its ray and the plane y = 0 alone.
     origins, directions = (np.asarray(rays) for rays in camera.rays())
     place = origins - directions * (origins[:, 1:2] / directions[:, 1:2])
@@ -188,7 +188,7 @@ def test_interpolation_compiles_batches_and_differentiates(sheet, rng, dtype):
     behind = jnp.array([1.0, 2, 3], dtype)
 
     def draw(values, background):
-        return interpolate(raster, sheet.faces, values, background)
+        return interpolate(raster, values, background)
 
     images, mask = map(np.asarray, (jax.jit(jax.vmap(draw, (0, None)))(batch, behind), raster.mask))
     assert images.dtype == dtype
@@ -213,9 +213,9 @@ def test_interpolation_refuses_values_of_another_mesh(unchecked):
     mesh = knot(400)
     raster = rasterize(mesh, Camera.facing(mesh, width=8, height=8))
     with pytest.raises(ValueError, match=rf"values for {len(mesh.vertices)} vertices, got 10"):
-        interpolate(raster, mesh.faces, jnp.zeros((10, 3)))
+        interpolate(raster, jnp.zeros((10, 3)))
     with pytest.raises(ValueError, match=r"values \(v, c\).*got shape"):
-        interpolate(raster, mesh.faces, jnp.zeros(len(mesh.vertices)))
+        interpolate(raster, jnp.zeros(len(mesh.vertices)))
 
 
 def test_more_samples_see_more_of_a_silhouette():
@@ -244,7 +244,7 @@ def test_samples_are_averaged_in_linear_light(sheet):
     values = sheet.vertices.astype(jnp.float64)
     background = jnp.array([5.0, 6, 7])
     image, fine = (
-        np.asarray(interpolate(raster, sheet.faces, values, background))
+        np.asarray(interpolate(raster, values, background))
         for raster in (rasterize(sheet, camera, samples=3), rasterize(sheet, finer))
     )
     np.testing.assert_allclose(image, fine.reshape(6, 3, 8, 3, 3).mean(axis=(1, 3)), atol=1e-6)
@@ -254,16 +254,14 @@ def test_background_may_be_a_picture_or_a_mark(sheet, rng, unchecked):
     camera = Camera((0, -4, 0), (0, 0, 0), width=8, height=6)
     raster = rasterize(sheet, camera, samples=2)
     picture = jnp.asarray(rng.uniform(size=(6, 8, 3)), jnp.float32)
-    image = interpolate(raster, sheet.faces, jnp.zeros_like(sheet.vertices), picture)
+    image = interpolate(raster, jnp.zeros_like(sheet.vertices), picture)
     np.testing.assert_allclose(image, (1 - raster.alpha[..., None]) * picture, atol=1e-7)
-    marked = interpolate(raster, sheet.faces, sheet.vertices, jnp.nan)
+    marked = interpolate(raster, sheet.vertices, jnp.nan)
     np.testing.assert_array_equal(np.isnan(marked[..., 0]), ~np.asarray(raster.mask))
-    gradient = jax.grad(lambda values: interpolate(raster, sheet.faces, values, picture).sum())(
-        sheet.vertices
-    )
+    gradient = jax.grad(lambda values: interpolate(raster, values, picture).sum())(sheet.vertices)
     np.testing.assert_allclose(gradient.sum(), 3 * float(raster.alpha.sum()), rtol=1e-5)
     with pytest.raises(ValueError, match=r"expected a background \(6, 8, 3\), got .*\(8, 6, 3\)"):
-        interpolate(raster, sheet.faces, sheet.vertices, picture.transpose(1, 0, 2))
+        interpolate(raster, sheet.vertices, picture.transpose(1, 0, 2))
 
 
 def test_samples_must_be_there(sheet):

@@ -12,7 +12,7 @@ DTYPES = pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
 
 
 def test_known_values_of_the_curve():
-    # Middle grey of 18 % is 117.6 of 255, half the signal is 21.4 % of the light (IEC 61966-2-1).
+    # Middle gray of 18 % is 117.6 of 255, half the signal is 21.4 % of the light (IEC 61966-2-1).
     linear = jnp.array([0.0, 0.0031308, 0.18, 0.21404114048223255, 0.5, 1.0])
     signal = [0.0, 0.040449936, 0.46135612950044164, 0.5, 0.7353569830524495, 1.0]
     np.testing.assert_allclose(srgb_encode(linear), signal, atol=1e-14)
@@ -70,14 +70,14 @@ def test_reinhard_is_the_papers_curve_on_luminance(rng):
     luminance = np.asarray(image) @ np.array([0.2126, 0.7152, 0.0722]) * 0.3
     for white in (2.0, 5.0, np.inf):
         mapped = luminance * (1 + luminance / white**2) / (1 + luminance)
-        colour = np.asarray(image) * 0.3 * (mapped / luminance)[..., None]
+        color = np.asarray(image) * 0.3 * (mapped / luminance)[..., None]
         found = tone_map(image, 0.3, curve="reinhard", white=white)
-        np.testing.assert_allclose(found, srgb_encode(jnp.clip(colour, 0, 1)), atol=1e-14)
-    # Grey: white is the least that becomes 1, and without one nothing does.
-    grey = jnp.broadcast_to(jnp.array([0.0, 0.5, 4.0, 1e30])[:, None], (4, 3))
-    found = srgb_decode(tone_map(grey, curve="reinhard", white=4.0))[:, 0]
+        np.testing.assert_allclose(found, srgb_encode(jnp.clip(color, 0, 1)), atol=1e-14)
+    # Gray: white is the least that becomes 1, and without one nothing does.
+    gray = jnp.broadcast_to(jnp.array([0.0, 0.5, 4.0, 1e30])[:, None], (4, 3))
+    found = srgb_decode(tone_map(gray, curve="reinhard", white=4.0))[:, 0]
     np.testing.assert_allclose(found, [0, 0.5 * (1 + 0.5 / 16) / 1.5, 1, 1], rtol=1e-12)
-    found = srgb_decode(tone_map(grey, curve="reinhard"))[:, 0]
+    found = srgb_decode(tone_map(gray, curve="reinhard"))[:, 0]
     np.testing.assert_allclose(found, [0, 1 / 3, 0.8, 1], rtol=1e-12)
 
 

@@ -62,7 +62,7 @@ def test_channels_are_found_by_name(tmp_path, rng):
 
 
 @pytest.mark.parametrize("names", [("Y",), ("Y", "A")])
-def test_grey_gives_three_equal_channels(tmp_path, rng, names):
+def test_gray_gives_three_equal_channels(tmp_path, rng, names):
     pixels = rng.uniform(0.1, 1, size=(4, 8, len(names))).astype(np.float32)
     image = read_environment(save(tmp_path / "a.exr", pixels, names=names))
     np.testing.assert_array_equal(image, np.repeat(pixels[..., :1], 3, axis=-1))

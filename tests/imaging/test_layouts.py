@@ -15,18 +15,18 @@ def save(path, picture):
 
 
 @pytest.mark.parametrize(("layout", "orientation"), PAINTERS)
-def test_each_axis_shows_its_colour(tmp_path, layout, orientation):
+def test_each_axis_shows_its_color(tmp_path, layout, orientation):
     """NaN around the circle and in empty cells must not be looked at."""
     directions = PAINTERS[layout, orientation](64)
-    path = save(tmp_path / "axes.npy", painters.coloured_axes(directions))
+    path = save(tmp_path / "axes.npy", painters.colored_axes(directions))
     image = read_environment(path, layout=layout, orientation=orientation, height=64)
     assert image.shape == (64, 128, 3)
     assert image.dtype == np.float32
-    for (x, y, z), colour in painters.AXES.items():
+    for (x, y, z), color in painters.AXES.items():
         row, column = int((1 - z) * 63 / 2 + 0.5), int(np.arctan2(y, x) / (2 * np.pi) * 128) % 128
-        np.testing.assert_allclose(image[row, column], colour, atol=0.02)
+        np.testing.assert_allclose(image[row, column], color, atol=0.02)
     # And between the axes.
-    expected = painters.coloured_axes(painters.jaxsh_lat_long(64))
+    expected = painters.colored_axes(painters.jaxsh_lat_long(64))
     np.testing.assert_allclose(image, expected, atol=0.015)
 
 
@@ -153,7 +153,7 @@ def test_the_range_of_float32_is_kept(tmp_path, rng, layout, value):
     assert 0.4 * value < image.min() <= image.max() <= np.float32(value)
 
 
-def test_a_face_goes_on_where_its_neighbour_begins(tmp_path):
+def test_a_face_goes_on_where_its_neighbor_begins(tmp_path):
     """One bright face: what bilinear look-up spreads over an edge is half a texel, not a seam."""
     faces = np.zeros((6, 16, 16, 3))
     faces[0] = 1

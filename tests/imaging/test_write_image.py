@@ -12,7 +12,7 @@ from jaxsh.imaging import write_image
 
 
 def load(path, kind="uint8"):
-    # PNG holds colours that are not multiplied by alpha: read them as they are held.
+    # PNG holds colors that are not multiplied by alpha: read them as they are held.
     hint = oiio.ImageSpec()
     hint.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), hint)
@@ -37,7 +37,7 @@ def test_png_clips(tmp_path):
     assert load(write_image(tmp_path / "a.png", image)).ravel().tolist() == [0, 0, 128, *[255] * 3]
 
 
-def test_png_leaves_colours_behind_alpha_alone(tmp_path):
+def test_png_leaves_colors_behind_alpha_alone(tmp_path):
     image = np.full((2, 2, 4), 0.8)
     image[..., 3] = [[0, 0.2], [0.6, 1]]
     pixels = load(write_image(tmp_path / "a.png", image))
@@ -74,7 +74,7 @@ def test_exr_keeps_small_and_large_float32(tmp_path):
     )
 
 
-def test_grey_hdr_has_three_channels(tmp_path):
+def test_gray_hdr_has_three_channels(tmp_path):
     pixels = load(write_image(tmp_path / "a.hdr", np.array([[0.25, 4.0]])), "float")
     np.testing.assert_array_equal(pixels, [[[0.25] * 3, [4.0] * 3]])
 
