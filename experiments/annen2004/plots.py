@@ -4,24 +4,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import NullFormatter
 from matplotlib.typing import LineStyleType
+
+from ..shared.plots import curve, plain_numbers, plt, save
 
 _DPI = 110
 _SCENES: dict[str, LineStyleType] = {"with the blocker": "-", "without it": "--"}
-
-
-def _numbers(axis) -> None:
-    """Plain numbers along a logarithmic axis."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def draw_distances(path: Path, rows: list[dict[str, Any]]) -> None:
@@ -35,17 +26,17 @@ def draw_distances(path: Path, rows: list[dict[str, Any]]) -> None:
     ]
     for method, scene, color, label in paper:
         left.plot(
-            *_line(rows, "distance", "error", method=method, scene=scene), color=color, label=label
+            *curve(rows, "distance", "error", method=method, scene=scene), color=color, label=label
         )
     left.set_title("as the paper's figure 8: first order")
     left.legend(frameon=False)
     left.set_ylim(bottom=0)
     for number, method in enumerate(methods):
         for scene, style in _SCENES.items():
-            line = _line(rows, "distance", "error", method=method, scene=scene)
-            right.plot(*line, style, color=f"C{number}", label=method if style == "-" else None)
+            curved = curve(rows, "distance", "error", method=method, scene=scene)
+            right.plot(*curved, style, color=f"C{number}", label=method if style == "-" else None)
     right.set_yscale("log")
-    _numbers(right.yaxis)
+    plain_numbers(right.yaxis)
     right.set_title("all orders")
     handles, labels = right.get_legend_handles_labels()
     handles += [Line2D([], [], color="grey", linestyle=style) for style in _SCENES.values()]
@@ -54,13 +45,7 @@ def draw_distances(path: Path, rows: list[dict[str, Any]]) -> None:
         axis.set_xlabel("distance from the sample, in the object's radius")
         axis.set_ylabel("RMS error of radiance (red), %")
         axis.grid(alpha=0.3)
-    figure.savefig(path, dpi=_DPI)
-    plt.close(figure)
-
-
-def _line(rows: list[dict[str, Any]], x: str, y: str, **wanted) -> tuple[list[float], list[float]]:
-    found = [row for row in rows if all(row.get(key) == value for key, value in wanted.items())]
-    return [row[x] for row in found], [row[y] for row in found]
+    save(figure, path, dpi=_DPI)
 
 
 def draw_claims(path: Path, rows: list[dict[str, Any]], methods: Sequence[str], box: float) -> None:
@@ -90,8 +75,7 @@ def draw_claims(path: Path, rows: list[dict[str, Any]], methods: Sequence[str], 
     axes[0].set_ylabel("samples")
     if image is not None:
         figure.colorbar(image, ax=list(axes), label="PSNR, dB", extend="both")
-    figure.savefig(path, dpi=_DPI)
-    plt.close(figure)
+    save(figure, path, dpi=_DPI)
 
 
 def draw_orders(path: Path, rows: list[dict[str, Any]], exact: float) -> None:
@@ -114,7 +98,7 @@ def draw_orders(path: Path, rows: list[dict[str, Any]], exact: float) -> None:
         axis.step(*zip(*front, strict=True), where="post", color="grey", linestyle=":")
         axis.axvline(exact, color="black", linestyle="--", linewidth=1)
         axis.set_xscale("log")
-        _numbers(axis.xaxis)
+        plain_numbers(axis.xaxis)
         axis.set_title(title)
         axis.set_xlabel("capture, project and shade, ms")
         axis.grid(alpha=0.3)
@@ -125,8 +109,7 @@ def draw_orders(path: Path, rows: list[dict[str, Any]], exact: float) -> None:
     handles.append(Line2D([], [], color="black", linestyle="--", linewidth=1))
     labels = [*(f"order {order}" for order in orders), "the front", "exact at each vertex"]
     axes[0].legend(handles, labels, frameon=False, loc="upper left")
-    figure.savefig(path, dpi=_DPI)
-    plt.close(figure)
+    save(figure, path, dpi=_DPI)
 
 
 def draw_placement(path: Path, rows: list[dict[str, Any]]) -> None:
@@ -138,9 +121,9 @@ def draw_placement(path: Path, rows: list[dict[str, Any]]) -> None:
     )
     for axis, scene in zip(axes[0], scenes, strict=True):
         for number, method in enumerate(methods):
-            line = _line(rows, "samples", "psnr", scene=scene, method=method)
+            curved = curve(rows, "samples", "psnr", scene=scene, method=method)
             style = "s--" if "grid" in method else "o-"
-            axis.plot(*line, style, color=f"C{number}", label=method, markersize=5)
+            axis.plot(*curved, style, color=f"C{number}", label=method, markersize=5)
         counts = sorted({row["samples"] for row in rows})
         axis.set_xscale("log")
         axis.set_xticks(counts, [str(count) for count in counts])
@@ -150,8 +133,7 @@ def draw_placement(path: Path, rows: list[dict[str, Any]]) -> None:
         axis.grid(alpha=0.3)
     axes[0, 0].set_ylabel("PSNR, dB")
     axes[0, -1].legend(frameon=False, fontsize=9)
-    figure.savefig(path, dpi=_DPI)
-    plt.close(figure)
+    save(figure, path, dpi=_DPI)
 
 
 def draw_frames(path: Path, rows: list[dict[str, Any]], target: float) -> None:
@@ -170,7 +152,7 @@ def draw_frames(path: Path, rows: list[dict[str, Any]], target: float) -> None:
         above.plot(frames, [row[key] for row in rows], style, color=color, label=label)
     above.axhline(100 * target, color="grey", linestyle="--", label="target")
     above.set_yscale("log")
-    _numbers(above.yaxis)
+    plain_numbers(above.yaxis)
     above.set_ylabel("error of the irradiance, %")
     above.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, fontsize=9, ncols=3)
     below.step(frames, [row["samples"] for row in rows], where="mid", color="C0")
@@ -181,5 +163,4 @@ def draw_frames(path: Path, rows: list[dict[str, Any]], target: float) -> None:
     below.legend(frameon=False, fontsize=9, ncols=2)
     for axis in (above, below):
         axis.grid(alpha=0.3)
-    figure.savefig(path, dpi=_DPI)
-    plt.close(figure)
+    save(figure, path, dpi=_DPI)

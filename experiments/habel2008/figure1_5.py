@@ -8,17 +8,13 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Array, Float
-from matplotlib.animation import PillowWriter
 
 from jaxsh import geometry, imaging, sky, transfer
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.plots import Panel, animate, draw_panels
 from .spheres import LUMINANCE
 
 _MESH_ALBEDO, _GROUND_ALBEDO = (0.62, 0.58, 0.52), (0.30, 0.29, 0.26)
@@ -106,8 +102,12 @@ def figure1_5(config: Figure15, context: Context) -> Table:
     pictures = _exposed(frames)
     chosen = np.linspace(0, len(frames) - 1, config.sheet).round().astype(int)
     caption = f"{config.bands} bands of sky and the sun's own light, from sunrise to sunset"
-    _draw_sheet(context.path("day.png", caption), [(frames[i], pictures[i]) for i in chosen])
-    _animate(context.path("day.gif", "the same, moving"), frames, pictures)
+    panels = [Panel(image, _caption(f)) for f, image in zip(frames, pictures, strict=True)]
+    sheet = [panels[i] for i in chosen]
+    draw_panels(
+        context.path("day.png", caption), [sheet[i : i + 4] for i in range(0, len(sheet), 4)]
+    )
+    animate(context.path("day.gif", "the same, moving"), [[panel] for panel in panels])
     return _table(config, context, chosen)
 
 
@@ -283,44 +283,6 @@ def _caption(frame: Frame) -> str:
     minutes = round(60 * (12 + frame.hour))
     elevation = np.degrees(np.arcsin(frame.sun[2]))
     return f"{minutes // 60:02d}:{minutes % 60:02d}   sun {elevation:.0f}° up"
-
-
-def _draw_sheet(path, cells: list[tuple[Frame, np.ndarray]]) -> None:
-    columns = min(4, len(cells))
-    rows = -(-len(cells) // columns)
-    height, width, _ = cells[0][1].shape
-    gap, letters = 4, max(14, height // 10)
-    whole = columns * (width + gap) + gap, rows * (height + letters + gap) + gap
-    figure = plt.figure(figsize=(whole[0] / _DPI, whole[1] / _DPI), dpi=_DPI)
-    for number, (frame, picture) in enumerate(cells):
-        row, column = divmod(number, columns)
-        left, top = gap + column * (width + gap), row * (height + letters + gap) + letters
-        figure.figimage(picture, left, whole[1] - top - height, origin="upper")
-        figure.text(
-            (left + width / 2) / whole[0],
-            1 - (top - letters / 2) / whole[1],
-            _caption(frame),
-            ha="center",
-            va="center",
-            fontsize=0.6 * letters * 72 / _DPI,
-        )
-    figure.savefig(path, dpi=_DPI)
-    plt.close(figure)
-
-
-def _animate(path, frames: list[Frame], pictures: list[np.ndarray]) -> None:
-    height, width, _ = pictures[0].shape
-    figure = plt.figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
-    shown = figure.figimage(pictures[0], 0, 0, origin="upper")
-    size = max(6.0, 0.05 * height) * 72 / _DPI
-    label = figure.text(0.02, 0.02, "", color="w", fontsize=size)
-    writer = PillowWriter(fps=10)
-    with writer.saving(figure, str(path), _DPI):
-        for frame, picture in zip(frames, pictures, strict=True):
-            shown.set_data(picture)
-            label.set_text(_caption(frame))
-            writer.grab_frame()
-    plt.close(figure)
 
 
 def _table(config: Figure15, context: Context, chosen) -> Table:

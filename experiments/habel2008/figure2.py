@@ -5,16 +5,13 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsh import harmonics, sky, sphere
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.plots import plt, save
 from .spheres import (
     LUMINANCE,
     mean_luminance,
@@ -138,8 +135,7 @@ def _draw(path, cases: list[Worst], bands: tuple[int, ...]) -> None:
     )
     for case, rows in zip(cases, np.split(axes, len(cases)), strict=True):
         _draw_case(figure, rows, case, bands)
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
+    save(figure, path, dpi=100)
 
 
 def _draw_case(figure, axes, case: Worst, bands: tuple[int, ...]) -> None:

@@ -4,16 +4,13 @@ import dataclasses
 from typing import Any, Literal
 
 import jax.numpy as jnp
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsh import harmonics, sky, sphere
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.plots import plt, save
 from .spheres import (
     LUMINANCE,
     mean_luminance,
@@ -170,5 +167,4 @@ def _draw(path, sun, turbidity: float, lights: dict[str, Array]) -> None:
     profile.set_xticks([-180, -90, 0, 90, 180], ["nadir", "horizon", "zenith", "horizon", "nadir"])
     profile.set_ylabel("luminance, in mean skies")
     profile.legend(frameon=False, ncols=3, loc="upper left")
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
+    save(figure, path, dpi=100)

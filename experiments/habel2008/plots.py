@@ -3,12 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from ..shared.plots import plt, save
 
 _MAPS = {"published": "Greys", "rival": "Oranges", "plain": "Blues", "ours": "Greens"}
 _MARKERS = "osv^D*"
@@ -46,8 +44,7 @@ def draw(path: Path, rows: list[dict[str, Any]], claim: dict[int, float]) -> Non
         loc="outside right center",
         frameon=False,
     )
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    save(figure, path, dpi=110)
 
 
 def _styles(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -58,7 +55,7 @@ def _styles(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
             names.append(row["model"])
     return {
         model: {
-            "color": matplotlib.colormaps[_MAPS[family]](shade),
+            "color": plt.get_cmap(_MAPS[family])(shade),
             "marker": _MARKERS[i % len(_MARKERS)],
             "linestyle": "--" if family in ("published", "rival") else "-",
         }

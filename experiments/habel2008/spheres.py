@@ -3,10 +3,6 @@
 from typing import Any
 
 import jax.numpy as jnp
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Array, Float
 from matplotlib.axes import Axes
@@ -14,6 +10,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from jaxsh import imaging, sky, sphere
+
+from ..shared.plots import plt
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec. 709
 _NEGATIVE = (0.3, 0.5, 1.0)  # light below zero has no colour of its own

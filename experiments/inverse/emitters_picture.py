@@ -4,16 +4,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import jax
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsh import geometry, imaging, inverse, midrange, transfer
 
-from ..shared.plots import View
+from ..shared.plots import View, plt, save
 from .lights import shade, with_noise
 
 if TYPE_CHECKING:
@@ -64,8 +60,7 @@ def draw(
     axes[3].set_title("from aside: true (white), recovered, start (grey)", fontsize=10)
     for axis in axes:
         axis.axis("off")
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
+    save(figure, path, dpi=100)
 
 
 def _draw_aside(axis, mesh, again: Float[Array, "v 3"], scene: Scene, size: int) -> None:

@@ -4,14 +4,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsh import geometry, imaging, inverse, sky
+
+from ..shared.plots import plt, save
 
 _DOME = 160
 
@@ -47,8 +45,7 @@ def draw_errors(path: Path, rows: list[dict[str, Any]]) -> None:
         axis.set_title(f"error of the {unit}")
         axis.grid(alpha=0.3)
     axes[0].legend(frameon=False, loc="lower right")
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    save(figure, path, dpi=110)
 
 
 def draw_sky(
@@ -77,8 +74,7 @@ def draw_sky(
         _draw_dome(below, case.found.value, sun)
         above.axis("off")
         below.axis("off")
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
+    save(figure, path, dpi=100)
 
 
 def _draw_dome(axis, value: inverse.SkyLight, sun: Float[np.ndarray, " 3"]) -> None:

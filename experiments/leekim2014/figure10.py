@@ -6,16 +6,11 @@ from pathlib import Path
 from typing import Literal
 
 import jax
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.animation import PillowWriter
 
 from ..habel2008.figure4 import windowed
 from ..runner import Column, Context, Table, experiment
-from ..shared.plots import Panel, draw_panels
+from ..shared.plots import Panel, animate, draw_panels, plt, save
 from .figure1 import BASE
 from .pictures import Canvas, Look, evened
 from .scenes import Scene, Scenes, rows_or_default
@@ -123,8 +118,7 @@ def _plot(path: Path, curves: dict[str, list[dict[str, float]]], step: float) ->
             axis.set_yscale("log")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right center", frameon=False)
-    figure.savefig(path, dpi=_DPI)
-    plt.close(figure)
+    save(figure, path, dpi=_DPI)
 
 
 def _pictures(
@@ -145,7 +139,7 @@ def _pictures(
     moving = [
         evened([list(_moving(config, canvas, shown, i))])[0] for i, canvas in enumerate(canvases)
     ]
-    _animate(context.path("spin.gif", caption), evened(moving))
+    animate(context.path("spin.gif", caption), evened(moving))
 
 
 def _column(
@@ -171,31 +165,6 @@ def _moving(
     for name, frame in (("filter", theirs), ("tiles", ours)):
         apart = canvas.difference(frame.color, frame.full, config.gain)
         yield Panel(apart, f"{name}, error × {config.gain:g}")
-
-
-def _animate(path: Path, frames: list[list[Panel]]) -> None:
-    strips = [np.concatenate([panel.image for panel in frame], axis=1) for frame in frames]
-    height, width, _ = strips[0].shape
-    above = round(0.09 * height)
-    figure = plt.figure(figsize=(width / _DPI, (height + above) / _DPI), dpi=_DPI)
-    figure.set_facecolor(strips[0][0, 0])
-    shown = figure.figimage(strips[0], 0, 0, origin="upper")
-    for j, panel in enumerate(frames[0]):
-        figure.text(
-            (j + 0.5) / len(frames[0]),
-            1 - above / 2 / (height + above),
-            panel.title,
-            ha="center",
-            va="center",
-            color="white",
-            fontsize=0.5 * above * 72 / _DPI,
-        )
-    writer = PillowWriter(fps=10)
-    with writer.saving(figure, str(path), _DPI):
-        for strip in strips:
-            shown.set_data(strip)
-            writer.grab_frame(facecolor=figure.get_facecolor())
-    plt.close(figure)
 
 
 def _table(config: Figure10, context: Context) -> Table:

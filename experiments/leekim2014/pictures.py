@@ -4,11 +4,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-import matplotlib
-
-matplotlib.use("Agg")
 import jax.numpy as jnp
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -16,7 +12,7 @@ from matplotlib.patches import Rectangle
 
 from jaxsh import imaging
 
-from ..shared.plots import GROUND, Panel, View
+from ..shared.plots import GROUND, Panel, View, plt
 from .scenes import Scene
 
 _DPI = 100

@@ -4,19 +4,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import (
-    FixedLocator,
-    LogLocator,
-    NullFormatter,
-    NullLocator,
-    StrMethodFormatter,
-)
+
+from ..shared.plots import logarithmic, plain_numbers, plt, save
 
 _DPI = 110
 _COLORS = {
@@ -48,7 +39,7 @@ def draw_degrees(path: Path, rows: Rows, paper: Mapping[int, tuple[float, float,
             left.plot(list(paper), values, style, color="C6", linewidth=1, label=label)
     left.set_yscale("log")
     left.set_ylabel("frames per second")
-    _plain(left.yaxis)
+    plain_numbers(left.yaxis)
     methods = dict.fromkeys(row["method"] for row in rows if "method" in row)
     for name in methods:
         mine = [row for row in rows if row.get("method") == name]
@@ -63,11 +54,11 @@ def draw_degrees(path: Path, rows: Rows, paper: Mapping[int, tuple[float, float,
         right.plot(list(paper), values, color="C6", linewidth=1, label="the paper's levels")
     right.axhline(1, color="0.6", linewidth=0.8)
     right.set_yscale("log")
-    _plain(right.yaxis)
+    plain_numbers(right.yaxis)
     right.set_ylabel("gain against the full computation")
     for axis in (left, right):
         axis.set_xlabel("degree")
-        axis.xaxis.set_major_locator(FixedLocator(degrees))
+        axis.set_xticks(degrees)
         below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 3}
         axis.legend(frameon=False, fontsize=8, **below)
     _finish(figure, path)
@@ -108,8 +99,7 @@ def draw_thresholds(path: Path, rows: Rows) -> None:
 
 def _by_threshold(axis: Axes, thresholds: Sequence[float]) -> None:
     axis.axvline(0.02, color="0.6", linewidth=0.8)
-    axis.set_xscale("log")
-    _ticks(axis, thresholds)
+    logarithmic(axis, thresholds)
     axis.set_xlabel("threshold of specular change")
 
 
@@ -132,8 +122,7 @@ def draw_exponents(path: Path, rows: Rows) -> None:
                 if np.isfinite(finite).any():
                     name = f"truncation at the cost of {method}"
                     axis.plot(at, finite, ":", color=_COLORS[method], label=name)
-        axis.set_xscale("log")
-        _ticks(axis, exponents)
+        logarithmic(axis, exponents)
         axis.set_xlabel("exponent of the lobe")
         axis.set_ylabel(label)
     handles, labels = axes[0].get_legend_handles_labels()
@@ -143,31 +132,12 @@ def draw_exponents(path: Path, rows: Rows) -> None:
     _finish(figure, path)
 
 
-def _ticks(axis: Axes, values: Sequence[float]) -> None:
-    """These values and no others along a logarithmic axis."""
-    axis.xaxis.set_major_locator(FixedLocator(values))
-    axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axis.xaxis.set_minor_locator(NullLocator())
-
-
 def _methods(rows: Rows) -> list[str]:
     return list(dict.fromkeys(row["method"] for row in rows))
 
 
-def _plain(axis) -> None:
-    """Plain numbers along a logarithmic axis."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axis.set_minor_formatter(NullFormatter())
-
-
 def _finish(figure, path: Path) -> None:
     for axis in figure.axes:
-        _open(axis)
-    figure.savefig(path, dpi=_DPI)
-    plt.close(figure)
-
-
-def _open(axis: Axes) -> None:
-    axis.spines[["top", "right"]].set_visible(False)
-    axis.grid(alpha=0.25)
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.grid(alpha=0.25)
+    save(figure, path, dpi=_DPI)

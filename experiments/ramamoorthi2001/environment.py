@@ -12,18 +12,15 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import jax
 import jax.numpy as jnp
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Array, Float
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from jaxsh import geometry, harmonics, imaging, sphere
+from jaxsh import harmonics, imaging, sphere
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.plots import View, plt, save
 
 ALBEDO = 0.5
 Window = Literal["none", "hann", "lanczos", "dering light", "dering irradiance"]
@@ -52,17 +49,6 @@ class Environment:
             raise ValueError(f"size must be at least 16 pixels, got {self.size}")
 
 
-class View(NamedTuple):
-    """What does not change between lights: the mesh, and which pixel sees what of it."""
-
-    mesh: geometry.Mesh
-    raster: imaging.Raster
-
-    def render(self, irradiance: Float[Array, "v 3"]) -> Float[Array, "h w 3"]:
-        """Outgoing radiance of a diffuse surface, albedo/π · E."""
-        return imaging.interpolate(self.raster, ALBEDO / np.pi * irradiance)
-
-
 class Shot(NamedTuple):
     """One light of one degree: its own picture on the sphere and what it makes of the mesh."""
 
@@ -82,7 +68,7 @@ def run(config: Environment, context: Context) -> list[Table]:
         environment = context.data.environment(name)
         with context.time(f"{name}: direct"):
             exact = jax.block_until_ready(direct_irradiance(mesh.normals, environment))
-        reference = view.render(exact)
+        reference = view.render(ALBEDO / np.pi * exact)
         exposure = imaging.auto_exposure(reference, view.raster.mask)
         rounding = _rounding(mesh.normals, environment, exact)
         shots = []
@@ -93,7 +79,7 @@ def run(config: Environment, context: Context) -> list[Table]:
             for window in WINDOWS:
                 windowed, strength = _windowed(light, window)
                 shaded = irradiance(windowed, mesh.normals)
-                image = view.render(shaded)
+                image = view.render(ALBEDO / np.pi * shaded)
                 row: dict[str, Any] = {
                     "environment": name,
                     "degree": degree,
@@ -253,8 +239,7 @@ def _draw(path, environment, reference, shots, exposure, view: View) -> None:
         axis.axis("off")
     scale = axes[2, 0].inset_axes((0.8, 0.1, 0.06, 0.8))
     figure.colorbar(error, cax=scale, label="error, % of white", ticklocation="left")
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
+    save(figure, path, dpi=100)
 
 
 def _draw_sheet(path, sheet, view: View) -> None:
@@ -276,8 +261,7 @@ def _draw_sheet(path, sheet, view: View) -> None:
         render.imshow(_over_white(reference, exposure, view))
         light.axis("off")
         render.axis("off")
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    save(figure, path, dpi=110)
 
 
 def _over_white(image, exposure, view: View):

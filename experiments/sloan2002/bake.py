@@ -6,7 +6,7 @@ import math
 import sys
 import time
 import warnings
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -38,7 +38,7 @@ class _Recorder:
         self._kept: list[tuple[np.ndarray, np.ndarray]] = []
         self._cast: list[int] = []
 
-    def occluded(self, origins, directions, max_distance=math.inf):
+    def occluded(self, origins, directions, max_distance: Any = math.inf):
         # An odd stride: the bake's calls alternate between two kinds.
         if next(self._calls) % 15 == 0:
             self._kept.append((origins, directions))

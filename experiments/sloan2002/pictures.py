@@ -3,21 +3,17 @@
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib
-
-matplotlib.use("Agg")
 import jax.numpy as jnp
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from matplotlib.typing import LineStyleType
 from scipy.ndimage import gaussian_filter
 
 from jaxsh import imaging
 
-_DPI = 100
+from ..shared.plots import Panel, curve, draw_panels, plain_numbers, plt, save
+
 _STYLES: dict[str, LineStyleType] = {"unshadowed": ":", "shadowed": "-"}
 _DIMMED = 0.25  # the environment behind the object, so that the object stands out
 
@@ -77,23 +73,10 @@ def draw_variants(path: Path, pictures: list[Picture], gain: float = 4) -> None:
 
 
 def _draw_cells(path: Path, cells: list[list[np.ndarray]], titles: list[str]) -> None:
-    """Pictures of one size side by side, pixel by pixel, a title above each column."""
-    height, width, _ = cells[0][0].shape
-    rows, columns = len(cells), len(cells[0])
-    gap, letter = max(2, width // 80), 0.05 * width
-    above = round(2 * letter)
-    whole = columns * (width + gap) + gap, above + rows * (height + gap)
-    figure = plt.figure(figsize=(whole[0] / _DPI, whole[1] / _DPI), dpi=_DPI)
-    for i, row in enumerate(cells):
-        for j, cell in enumerate(row):
-            left, top = gap + j * (width + gap), above + i * (height + gap)
-            figure.figimage(cell, left, whole[1] - top - height, origin="upper")
-    for j, title in enumerate(titles):
-        centre = (gap + j * (width + gap) + width / 2) / whole[0]
-        middle = 1 - above / 2 / whole[1]
-        figure.text(centre, middle, title, ha="center", va="center", fontsize=letter * 72 / _DPI)
-    figure.savefig(path, dpi=_DPI)
-    plt.close(figure)
+    """Draw pictures of one size side by side, a title above each column."""
+    rows = [[Panel(cell) for cell in row] for row in cells]
+    rows[0] = [Panel(cell, title) for cell, title in zip(cells[0], titles, strict=True)]
+    draw_panels(path, rows, ground=1.0, letters="black")
 
 
 def draw_errors(path: Path, rows: list[dict[str, Any]]) -> None:
@@ -111,17 +94,11 @@ def draw_errors(path: Path, rows: list[dict[str, Any]]) -> None:
     for axis, mesh in zip(axes[0], meshes, strict=True):
         for number, environment in enumerate(environments):
             for variant, style in _STYLES.items():
-                key = mesh, environment, variant
-                line = [
-                    (row["degree"], row["error"])
-                    for row in rows
-                    if (row["mesh"], row["environment"], row["variant"]) == key
-                ]
-                axis.plot(*zip(*line, strict=True), style, color=f"C{number}", marker=".")
+                about = {"mesh": mesh, "environment": environment, "variant": variant}
+                line = curve(rows, "degree", "error", **about)
+                axis.plot(*line, style, color=f"C{number}", marker=".")
         axis.set_yscale("log")
-        axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.yaxis.set_minor_formatter(NullFormatter())
+        plain_numbers(axis.yaxis)
         axis.set_xticks(sorted({row["degree"] for row in rows}))
         axis.set_title(mesh)
         axis.set_xlabel("degree")
@@ -132,5 +109,4 @@ def draw_errors(path: Path, rows: list[dict[str, Any]]) -> None:
         *(Line2D([], [], color="grey", linestyle=style) for style in _STYLES.values()),
     ]
     figure.legend(handles, [*environments, *_STYLES], loc="outside right center", frameon=False)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    save(figure, path, dpi=110)

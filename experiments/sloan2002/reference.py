@@ -38,9 +38,9 @@ class Receivers(NamedTuple):
     normals: Float[np.ndarray, "v 3"]
 
     @classmethod
-    def of(cls, mesh: geometry.Mesh, chosen: Int[np.ndarray, " v"], offset: float) -> "Receivers":
+    def of(cls, mesh: geometry.Mesh, chosen: Int[np.ndarray, " v"], ray_bias: float) -> "Receivers":
         vertices, normals = np.asarray(mesh.vertices), np.asarray(mesh.normals)
-        lift = offset * np.ptp(vertices, axis=0).max() / 2
+        lift = ray_bias * np.ptp(vertices, axis=0).max() / 2
         return cls(vertices[chosen] + lift * normals[chosen], normals[chosen])
 
 
@@ -79,14 +79,14 @@ def irradiance(
     *,
     albedo: float,
     paths: int,
-    offset: float,
+    ray_bias: float,
     context: Context,
 ) -> dict[str, dict[str, Estimate]]:
     """RGB irradiance of the chosen vertices, by environment and variant.
 
     Environments of one size share their rays.
     """
-    scene, receivers = geometry.ray_scene(mesh), Receivers.of(mesh, chosen, offset)
+    scene, receivers = geometry.ray_scene(mesh), Receivers.of(mesh, chosen, ray_bias)
     sizes: dict[tuple[int, ...], list[str]] = {}
     for name, environment in environments.items():
         sizes.setdefault(environment.shape, []).append(name)
@@ -99,7 +99,7 @@ def irradiance(
             directions = pixels.directions(np.arange(len(pixels.flux)), rng)
             open_sky, shadowed = direct(scene, receivers, directions, pixels.flux, context)
             reflected = one_bounce(
-                mesh, scene, receivers, pixels, albedo, offset, paths, rng, context
+                mesh, scene, receivers, pixels, albedo, ray_bias, paths, rng, context
             )
             halves.append((open_sky, shadowed, shadowed + reflected))
         for i, name in enumerate(names):
@@ -145,7 +145,7 @@ def one_bounce(
     receivers: Receivers,
     pixels: Pixels,
     albedo: float,
-    offset: float,
+    ray_bias: float,
     paths: int,
     rng: np.random.Generator,
     context: Context,
@@ -158,7 +158,7 @@ def one_bounce(
     """
     probes = [pixels.flux[:, i : i + 3] for i in range(0, pixels.flux.shape[1], 3)]
     cumulative = [np.cumsum(probe.sum(axis=1), dtype=np.float64) for probe in probes]
-    lift = offset * np.ptp(np.asarray(mesh.vertices), axis=0).max() / 2
+    lift = ray_bias * np.ptp(np.asarray(mesh.vertices), axis=0).max() / 2
     total = np.zeros((len(receivers.normals), pixels.flux.shape[1]))
     for part in context.progress(_parts(len(total), 16 * paths), "paths"):
         normals = receivers.normals[part]
