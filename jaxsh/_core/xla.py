@@ -13,6 +13,11 @@ def on_mesh(*arguments) -> bool:
     return any(math.prod(jax.typeof(leaf).sharding.mesh.axis_sizes) > 1 for leaf in leaves)
 
 
+def rows_are_split(array) -> bool:
+    """True where explicit axes of a mesh share out the leading axis; automatic ones do not tell."""
+    return jax.typeof(array).sharding.spec[:1] not in ((), (None,))
+
+
 def materialize(function, *arguments):
     """`function(*arguments)`, computed once and stored, where XLA would fuse it into each consumer.
 

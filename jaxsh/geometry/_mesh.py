@@ -9,6 +9,7 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Float, Int
 
+from .._core.xla import keep_rows, rows_are_split
 from ._clean import clean
 
 
@@ -52,13 +53,22 @@ def build(vertices: np.ndarray, faces: np.ndarray, *, source: str, corners: bool
     return Mesh(points, triangles, vertex_normals(points, triangles))
 
 
-@jax.jit
 def vertex_normals(vertices: Float[Array, "v 3"], faces: Int[Array, "f 3"]) -> Float[Array, "v 3"]:
     """Unit vertex normals: the mean of the normals of the faces around, weighted by their area.
 
     Has the dtype of the vertices. Differentiable in the vertices, forward and reverse. Where a
     vertex's faces cancel, have no area, or there are none, the normal is +z with zero gradient.
     """
+    if rows_are_split(vertices):
+        raise ValueError(
+            "vertex normals need all vertices on each device, since faces name any of them: share "
+            "out the faces, or poses of the mesh along an axis in front by vmap"
+        )
+    return keep_rows(_vertex_normals, vertices, faces, like=faces, axis=0, out=None)
+
+
+@jax.jit
+def _vertex_normals(vertices, faces):
     # Neither factor changes a direction: without them large or tiny meshes leave float32's range.
     points = vertices / _largest(vertices)
     corners = points[faces]

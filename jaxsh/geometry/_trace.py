@@ -1,5 +1,6 @@
 """Rays through a tree of boxes, in JAX: many lanes walk in step, each with a ray of its own."""
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -7,6 +8,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
+from .._core.xla import keep_rows, on_mesh, rows_are_split
 from ._tree import RayTree
 from ._triangle import meet
 
@@ -64,12 +66,23 @@ def trace(
         (tree, origins, directions, max_distance)
     )
     size = len(origins)
-    rays = jnp.concatenate([origins, directions], axis=1).astype(jnp.float32)
     limits = jnp.broadcast_to(jnp.asarray(max_distance, jnp.float32), size)
-    end = jnp.asarray(size if count is None else count, jnp.int32)
     if size == 0:
         return Trace(limits, jnp.zeros(0, jnp.int32), jnp.zeros((0, 3), jnp.float32))
-    lanes = min(lanes, size)
+    end = jnp.asarray(size if count is None else count, jnp.int32)
+    # Lanes that take rays from one queue would gather shared-out rays on each device.
+    cast = _cast_apart if on_mesh(origins, directions) else _cast_in_lanes
+    cast = functools.partial(cast, first=first, lanes=min(lanes, size))
+    like = origins if rows_are_split(origins) else directions
+    return keep_rows(cast, tree, origins, directions, limits, end, like=like, axis=0, out=0)
+
+
+def _cast_in_lanes(
+    tree: RayTree, origins, directions, limits, end, *, first: bool | Array, lanes: int
+) -> Trace:
+    """Cast rays in lanes that take the next ray when they are through."""
+    size = len(origins)
+    rays = jnp.concatenate([origins, directions], axis=1).astype(jnp.float32)
 
     def refill(state: _Lanes) -> _Lanes:
         idle = state.node == 0
@@ -110,11 +123,39 @@ def trace(
         found=jnp.full(size, -1, jnp.int32),
     )
     last = lax.while_loop(lambda state: state.started < end, advance, start)
-    leaf = refill(last).found
+    return _met(tree, rays, refill(last).found)
 
+
+def _cast_apart(
+    tree: RayTree, origins, directions, limits, end, *, first: bool | Array, lanes: int
+) -> Trace:
+    """Cast each ray in a lane of its own, so that rays may be shared out between devices."""
+    del lanes
+    rays = jnp.concatenate([origins, directions], axis=1).astype(jnp.float32)
+    # Made of the rays, so that in `shard_map` each array varies over the devices as they do.
+    zero = ((rays[:, 0] > 0) & False).astype(jnp.int32)
+    place = jnp.arange(len(rays), dtype=jnp.int32) + zero
+    start = _Lanes(
+        ray=place,
+        origin=rays[:, :3].T,
+        direction=rays[:, 3:].T,
+        node=jnp.where(place < end, 1, zero),
+        pending=zero,
+        distance=limits + zero.astype(jnp.float32),
+        leaf=zero - 1,
+        started=end,
+        found=zero,
+    )
+    last = lax.while_loop(
+        lambda state: jnp.any(state.node > 0), lambda state: _burst(tree, state, first), start
+    )
+    return _met(tree, rays, last.leaf)
+
+
+def _met(tree: RayTree, rays: Float[Array, "n 6"], leaf: Int[Array, " n"]) -> Trace:
+    """Give the distance and weights of each ray at the leaf that it met."""
     hit = leaf >= 0
-    origin, direction = rays[:, :3].T, rays[:, 3:].T
-    _, distance, weights = meet(tree.corners[jnp.where(hit, leaf, 0)], origin, direction)
+    _, distance, weights = meet(tree.corners[jnp.where(hit, leaf, 0)], rays[:, :3].T, rays[:, 3:].T)
     return Trace(
         jnp.where(hit, distance, jnp.inf),
         jnp.where(hit, tree.triangle[leaf], -1),
@@ -124,7 +165,7 @@ def trace(
 
 def _burst(tree: RayTree, state: _Lanes, first: bool | Array) -> _Lanes:
     """Some boxes, then the triangle of each lane that has come to a leaf."""
-    # Without a division by zero; where a ray does not move it has all the time in the world.
+    # Without a division by zero: an axis along which the ray is constant never limits it.
     still = jnp.abs(state.direction) < 1e-20
     inverse = lax.optimization_barrier(1 / jnp.where(still, 1e-20, state.direction))
     node, pending = lax.fori_loop(

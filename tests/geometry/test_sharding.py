@@ -1,0 +1,102 @@
+"""Rays and normals on a mesh of devices; what runs on the host takes shared arrays too."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.sharding import AxisType, NamedSharding
+from jax.sharding import PartitionSpec as P
+from sharding import ROWS, WHOLE, check_sharded
+
+from jaxsh import geometry
+from jaxsh.geometry import RayTree
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return geometry.JaxRayScene(geometry.knot(300))
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_trace_keeps_the_sharding_of_rays(scene, rng, first):
+    origins, directions = rng.normal(size=(2, 64, 3)).astype(np.float32)
+    limits = rng.uniform(0.5, 2, size=64).astype(np.float32)
+
+    def cast(boxes, corners, triangle, origins, directions, limits):
+        tree = RayTree(boxes, corners, triangle)
+        found = geometry.trace(tree, origins, directions, limits, first=first, lanes=16)
+        hit = (found.triangle >= 0).astype(np.float32)
+        if not first:
+            return hit
+        return found.triangle, jnp.where(hit > 0, found.distance, -1), found.barycentric
+
+    specs = (WHOLE, WHOLE, WHOLE, ROWS, ROWS, ROWS)
+    out = (ROWS, ROWS, ROWS) if first else ROWS
+    check_sharded(cast, (*scene.tree, origins, directions, limits), specs, out)
+
+
+def test_rays_of_the_sun_keep_the_sharding_of_their_origins(scene, rng):
+    origins = rng.normal(size=(64, 3)).astype(np.float32)
+
+    def lit(origins, sun):
+        directions = jnp.broadcast_to(sun[None], origins.shape)
+        found = geometry.trace(scene.tree, origins, directions, first=False)
+        return (found.triangle < 0).astype(jnp.float32)
+
+    check_sharded(lit, (origins, np.array([0, 0.6, 0.8], np.float32)), (ROWS, WHOLE), ROWS)
+
+
+@pytest.mark.parametrize("count", [0, 5, 40])
+def test_rays_beyond_the_count_miss(scene, rng, count):
+    """On a mesh of devices too, where each ray has a lane of its own."""
+    origins, directions = rng.normal(size=(2, 64, 3)).astype(np.float32)
+    mesh = jax.make_mesh((2,), ("rows",), axis_types=(AxisType.Auto,))
+    placed = jax.device_put((origins, directions), NamedSharding(mesh, ROWS))
+
+    @jax.jit
+    def cast(origins, directions, count):
+        return geometry.trace(scene.tree, origins, directions, count=count).triangle
+
+    whole, shared = cast(*map(jnp.asarray, (origins, directions)), count), cast(*placed, count)
+    np.testing.assert_array_equal(shared, whole)
+    assert (np.asarray(shared)[count:] == -1).all()
+
+
+@pytest.mark.parametrize("kind", [AxisType.Auto, AxisType.Explicit])
+def test_normals_of_shared_faces_are_those_of_all(kind):
+    knot = geometry.knot(300)
+    mesh = jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+    faces = jax.device_put(knot.faces, NamedSharding(mesh, ROWS))
+    vertices = jax.device_put(knot.vertices, NamedSharding(mesh, WHOLE))
+    compiled = jax.jit(geometry.vertex_normals).lower(vertices, faces).compile()
+    np.testing.assert_allclose(compiled(vertices, faces), knot.normals, atol=1e-6)
+    assert " all-gather" not in compiled.as_text()
+
+
+def test_normals_keep_the_sharding_of_poses(rng):
+    knot = geometry.knot(300)
+    poses = np.asarray(knot.vertices) + 0.1 * rng.normal(size=(2, 300, 3)).astype(np.float32)
+    normals = jax.vmap(lambda v: geometry.vertex_normals(v, knot.faces))
+    check_sharded(normals, (poses,), (ROWS,), ROWS)
+    check_sharded(jax.grad(lambda v: jnp.sum(normals(v) ** 3)), (poses,), (ROWS,), ROWS, rtol=1e-4)
+
+
+def test_normals_of_shared_vertices_are_refused():
+    knot = geometry.knot(300)
+    mesh = jax.make_mesh((2,), ("rows",), axis_types=(AxisType.Explicit,))
+    vertices = jax.device_put(knot.vertices, NamedSharding(mesh, ROWS))
+    with pytest.raises(ValueError, match="need all vertices on each device"):
+        geometry.vertex_normals(vertices, knot.faces)
+
+
+def test_what_runs_on_the_host_takes_shared_arrays(scene, rng):
+    """Ray scenes, neighbors and topology are NumPy: they read the whole of what is shared out."""
+    knot = geometry.knot(300)
+    mesh = jax.make_mesh((2,), ("rows",), axis_types=(AxisType.Auto,))
+    shared = jax.device_put(knot, NamedSharding(mesh, ROWS))
+    np.testing.assert_array_equal(geometry.neighbors(shared), geometry.neighbors(knot))
+    assert geometry.topology(shared) == geometry.topology(knot)
+    rays = rng.normal(size=(2, 64, 3)).astype(np.float32)
+    placed = jax.device_put(rays, NamedSharding(mesh, P(None, "rows")))
+    for one, other in zip(scene.closest_hit(*placed), scene.closest_hit(*rays), strict=True):
+        np.testing.assert_array_equal(one, other)
