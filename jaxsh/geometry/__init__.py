@@ -1,18 +1,17 @@
 """Shapes and the rays between them: triangle meshes, read from files or made, and ray casting.
 
-Meshes are JAX arrays and their normals differentiate; rays run on all cores through Embree, or
-through JAX where there is no Embree, in float32, take NumPy or JAX arrays and give NumPy arrays
-back. Space is right-handed with z up.
+Meshes are JAX arrays and their normals differentiate. Rays run on all cores through Embree, or
+through JAX where there is no Embree, in float32; they take NumPy or JAX arrays and give NumPy
+arrays back. Space is right-handed with z up.
 """
 
 from ._cast import JaxRayScene
 from ._embree import EmbreeRayScene, ray_scene
 from ._knot import knot
 from ._mesh import Mesh, make_mesh, vertex_normals
-from ._neighbors import neighbors
 from ._rays import Hit, RayScene
 from ._read import read_mesh
-from ._topology import Topology, topology
+from ._topology import Topology, neighbors, topology
 from ._trace import Trace, trace
 from ._tree import RayTree
 

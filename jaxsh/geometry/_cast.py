@@ -1,4 +1,4 @@
-"""Ray casting without Embree: the same questions, answered by JAX."""
+"""Ray casting without Embree, by JAX."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -26,11 +26,23 @@ class JaxRayScene:
     Takes one `Mesh` or a sequence of them; a later change of a mesh is not seen. Faces stop rays
     from both sides. Watertight at edges and vertices. Positions, directions and distances are
     float32 within, and agree with Embree's to rounding; a ray through an edge may name either of
-    its faces.
+    its faces, and one that passes an edge within rounding (4e-7 of the distance) may hit it.
 
     On a CPU slower than Embree, which is made for it. The first query compiles, once for each
     power of two of the number of faces; no number of rays compiles anew. Memory is bounded, for
-    rays pass in chunks. `tree` is what `trace` takes, for rays cast inside `jit`.
+    rays pass in chunks. `tree` is what `trace` takes, for rays cast inside `jit`; the methods run
+    outside it, on one device, and give NumPy arrays. Not differentiable.
+
+    Raises `ValueError` for no mesh, and for meshes without a face of finite corners.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import geometry
+    >>> scene = geometry.JaxRayScene(geometry.knot(300))
+    >>> up = np.array([0.0, 0.0, 1.0])
+    >>> scene.occluded(np.array([[0.0, 0.0, -2.0], [2.0, 0.0, 0.0]]), up).shape
+    (2,)
     """
 
     tree: RayTree
@@ -48,7 +60,7 @@ class JaxRayScene:
         directions: Vectors,
         max_distance: float | Float[Array | np.ndarray, " n"] = math.inf,
     ) -> Bool[np.ndarray, " n"]:
-        """Whether anything lies on the ray within `max_distance` of its origin.
+        """Tell whether anything lies on the ray within `max_distance` of its origin.
 
         Arguments and errors as for `RayScene.occluded`.
         """
@@ -60,7 +72,7 @@ class JaxRayScene:
         return result
 
     def closest_hit(self, origins: Vectors, directions: Vectors) -> Hit:
-        """The first surface that each ray meets. Arguments and errors as for `occluded`."""
+        """Find the first surface that each ray meets. Arguments and errors as for `occluded`."""
         origins, directions = paired(origins, directions)
         count = len(origins)
         limits = np.broadcast_to(np.float32(np.inf), count)
@@ -75,7 +87,7 @@ class JaxRayScene:
     def _each_chunk(
         self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, *, first: bool
     ) -> Iterator[tuple[slice, tuple[np.ndarray, ...]]]:
-        """Cast rays in chunks of one size, and give what those of each met."""
+        """Cast rays in chunks of one size, and yield what the rays of each met."""
         lanes = _LANES.get(jax.default_backend(), _MANY_LANES)
         size = lanes * _CHUNK
         padded = [np.zeros(shape, np.float32) for shape in ((size, 3), (size, 3), size)]

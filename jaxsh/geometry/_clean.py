@@ -1,4 +1,4 @@
-"""What a file may hold and a mesh may not."""
+"""Faults of raw vertices and faces that a mesh may not have."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ import numpy as np
 def clean(
     vertices: np.ndarray, faces: np.ndarray, *, corners: bool
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Float32 vertices and int32 faces without faults, and a sentence part for each fault found.
+    """Give float32 vertices and int32 faces without faults, and a phrase for each fault found.
 
     With `corners`, the source stores vertices once per face corner or seam by nature (STL, glTF),
     so that merging equal ones is no finding.
@@ -78,13 +78,13 @@ def _check(vertices: np.ndarray, faces: np.ndarray) -> None:
 
 
 def _first_of_equals(vertices: np.ndarray) -> np.ndarray:
-    """For each vertex the index of the first one at the same position."""
+    """Give for each vertex the index of the first one at the same position."""
     _, first, group = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     return first[group.reshape(-1)].astype(np.int32)
 
 
 def _has_area(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Whether a face is higher, over its longest edge, than float32 can tell from zero."""
+    """Tell whether a face is higher, over its longest edge, than float32 can tell from zero."""
     corners = vertices[faces].astype(np.float64)
     edges = np.roll(corners, -1, axis=1) - corners
     longest_squared = (edges**2).sum(axis=2).max(axis=1)

@@ -12,12 +12,18 @@ _TURNS, _COILS, _SWING, _PIPE = 2, 3, 0.5, 0.34
 
 
 def knot(vertices: int = 20_000) -> Mesh:
-    """A thick trefoil knot: closed, smooth, concave, and full of shadows that it casts on itself.
+    """Make a thick trefoil knot: closed, smooth, concave, full of shadows that it casts on itself.
 
     Around `vertices` vertices (at least 300): the grid of m × n nearly square cells that comes
     closest, so m·n vertices and 2·m·n faces; the default has 20,020 and 40,040. It is one
     watertight surface of genus 1, wound outwards, within the unit ball around the origin. It
-    stands upright (z up), flat side towards -y.
+    stands upright (z up), flat side towards -y. Raises `ValueError` for fewer than 300.
+
+    **Example**
+
+    >>> from jaxsh import geometry
+    >>> print(geometry.topology(geometry.knot(300)))
+    300 vertices and 600 faces in 1 piece, closed, genus 1
     """
     if vertices < 300:
         raise ValueError(f"a knot needs at least 300 vertices to be one, got {vertices}")
@@ -48,7 +54,7 @@ def knot(vertices: int = 20_000) -> Mesh:
 
 
 def _curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) of the knot's center line, and the torus's normals there."""
+    """Give points (n, 3) of the knot's center line, and the torus's normals there."""
     u, v = _TURNS * t, _COILS * t
     outward = np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], axis=1)
     ring = np.stack([np.cos(u), np.sin(u), np.zeros_like(u)], axis=1)

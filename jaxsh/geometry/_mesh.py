@@ -1,4 +1,4 @@
-"""The mesh, its normals, and the way in for raw arrays."""
+"""The mesh, its normals, and how raw arrays become one."""
 
 import warnings
 
@@ -14,11 +14,19 @@ from ._clean import clean
 
 
 class Mesh(eqx.Module):
-    """A triangle mesh: positions, faces (counter-clockwise seen from outside), unit normals.
+    """Holds a triangle mesh: positions, faces (counter-clockwise seen from outside), unit normals.
 
     `make_mesh` and `read_mesh` give float32 vertices and normals and int32 faces, with no
-    degenerate face and no vertex that is NaN, infinite, twice there or in no face; a `Mesh` built
+    degenerate face and no vertex that is NaN, infinite, duplicate or in no face; a `Mesh` built
     by hand is taken as it is. Differentiable in vertices and normals; the faces are constants.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh.geometry import Mesh, vertex_normals
+    >>> vertices, faces = jnp.eye(3, dtype=jnp.float32), jnp.array([[0, 1, 2]])
+    >>> Mesh(vertices, faces, vertex_normals(vertices, faces)).normals.shape
+    (3, 3)
     """
 
     vertices: Float[Array, "v 3"]
@@ -29,20 +37,29 @@ class Mesh(eqx.Module):
 def make_mesh(
     vertices: Float[Array | np.ndarray, "v 3"], faces: Int[Array | np.ndarray, "f 3"]
 ) -> Mesh:
-    """A `Mesh` from positions (v, 3) and vertex indices (f, 3), cleaned.
+    """Make a `Mesh` from positions (v, 3) and vertex indices (f, 3), cleaned.
 
     Faces that touch a NaN or infinite vertex, faces without area (to float32's resolution) and
     repeated faces are dropped, vertices at exactly the same float32 position merged, and vertices
-    in no face dropped; what stays keeps its order. One `UserWarning` counts what was found.
+    in no face dropped; the rest keeps its order. One `UserWarning` counts what was found.
 
     Raises `ValueError` where shapes are wrong, an index names no vertex, or no face is left.
     Not differentiable: move the vertices of the result and call `vertex_normals`.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import geometry
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> square = geometry.make_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+    >>> square.normals.tolist()[0]
+    [0.0, 0.0, 1.0]
     """
     return build(np.asarray(vertices), np.asarray(faces), source="mesh", corners=False)
 
 
 def build(vertices: np.ndarray, faces: np.ndarray, *, source: str, corners: bool) -> Mesh:
-    """`make_mesh` for a named source; `corners` as in `clean`."""
+    """Make a mesh as `make_mesh` does, for a named source; `corners` as in `clean`."""
     try:
         vertices, faces, found = clean(vertices, faces, corners=corners)
     except ValueError as error:
@@ -54,10 +71,22 @@ def build(vertices: np.ndarray, faces: np.ndarray, *, source: str, corners: bool
 
 
 def vertex_normals(vertices: Float[Array, "v 3"], faces: Int[Array, "f 3"]) -> Float[Array, "v 3"]:
-    """Unit vertex normals: the mean of the normals of the faces around, weighted by their area.
+    """Compute unit vertex normals: the mean of the faces' normals around, weighted by their area.
 
-    Has the dtype of the vertices. Differentiable in the vertices, forward and reverse. Where a
-    vertex's faces cancel, have no area, or there are none, the normal is +z with zero gradient.
+    `vertices` (v, 3) and `faces` (f, 3) give (v, 3) in the dtype of the vertices. Where a vertex's
+    faces cancel, have no area, or there are none, the normal is +z with zero gradient.
+
+    Differentiable in the vertices, forward and reverse. Runs under `jit` and `vmap`. Faces may be
+    shared out between devices, and poses along an axis in front by `vmap`; vertices may not, since
+    a face names any of them: along explicit axes that raises `ValueError`, along automatic ones
+    XLA gathers them.
+
+    **Example**
+
+    >>> from jaxsh import geometry
+    >>> mesh = geometry.knot(300)
+    >>> geometry.vertex_normals(2 * mesh.vertices, mesh.faces).shape
+    (300, 3)
     """
     if rows_are_split(vertices):
         raise ValueError(
@@ -82,6 +111,6 @@ def _vertex_normals(vertices, faces):
 
 
 def _largest(x: Array, axis: int | None = None) -> Array:
-    """The largest magnitude, as a constant to divide by; 1 where everything is zero."""
+    """Take the largest magnitude, as a constant to divide by; 1 where everything is zero."""
     largest = lax.stop_gradient(jnp.max(jnp.abs(x), axis=axis, keepdims=True, initial=0))
     return jnp.where(largest > 0, largest, 1)

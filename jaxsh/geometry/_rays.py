@@ -1,4 +1,4 @@
-"""Which rays a scene of meshes stops: the questions, the answers, and the checks of both."""
+"""Questions to a scene of meshes, their answers, and the checks of rays."""
 
 import math
 from typing import Any, NamedTuple, Protocol, runtime_checkable
@@ -11,9 +11,18 @@ Vectors = Float[Array | np.ndarray, "n 3"] | Float[Array | np.ndarray, " 3"]
 
 
 class Hit(NamedTuple):
-    """The first surface along each of n rays (NumPy arrays).
+    """Holds the first surface along each of n rays (NumPy arrays).
 
     A miss has an infinite `distance`, `mesh` and `face` -1 and zero `barycentric`.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import geometry
+    >>> scene = geometry.ray_scene(geometry.knot(300))
+    >>> hit = scene.closest_hit(np.array([0.0, 0.0, 3.0]), np.array([0.0, 0.0, 1.0]))
+    >>> hit.mesh.tolist(), hit.face.tolist(), hit.distance.tolist()
+    ([-1], [-1], [inf])
     """
 
     distance: Float[np.ndarray, " n"]  # along the ray, in the unit of the vertices; float32
@@ -24,11 +33,29 @@ class Hit(NamedTuple):
 
 @runtime_checkable
 class RayScene(Protocol):
-    """Answers which rays are stopped, as `ray_scene` does: anything with these two methods.
+    """Answers which rays are stopped: anything with these two methods.
 
-    `EmbreeRayScene` and `JaxRayScene` are such scenes; one of your own may wrap another (to count
-    its rays, say) or know its surfaces in closed form. `transfer.bake`, `imaging.rasterize` and
-    `midrange.capture` take any.
+    `ray_scene` makes one. A class of your own may wrap another scene (to count its rays, say) or
+    know its surfaces in closed form. `transfer.bake`, `imaging.rasterize` and `midrange.capture`
+    take any.
+
+    **Example**
+
+    >>> import math
+    >>> from jaxsh import geometry, transfer
+    >>> class Counting:
+    ...     def __init__(self, scene):
+    ...         self.scene, self.rays = scene, 0
+    ...     def occluded(self, origins, directions, max_distance=math.inf):
+    ...         self.rays += len(origins)
+    ...         return self.scene.occluded(origins, directions, max_distance)
+    ...     def closest_hit(self, origins, directions):
+    ...         return self.scene.closest_hit(origins, directions)
+    >>> mesh = geometry.knot(300)
+    >>> scene = Counting(geometry.ray_scene(mesh))
+    >>> baked = transfer.bake(mesh, 1, directions=64, scene=scene)
+    >>> scene.rays > 0
+    True
     """
 
     def occluded(
@@ -37,22 +64,22 @@ class RayScene(Protocol):
         directions: Vectors,
         max_distance: float | Float[Array | np.ndarray, " n"] = math.inf,
     ) -> Bool[np.ndarray, " n"]:
-        """Whether anything lies on the ray within `max_distance` of its origin.
+        """Tell whether anything lies on the ray within `max_distance` of its origin.
 
         `origins` and `directions` are (n, 3), or (3,) for one that all rays share. Directions
-        need no unit length; distances are in the unit of the vertices.
+        need no unit length; distances are in the unit of the vertices. Gives n booleans.
 
         Raises `ValueError` for wrong shapes, NaN or infinite vectors, zero directions.
         """
         ...
 
     def closest_hit(self, origins: Vectors, directions: Vectors) -> Hit:
-        """The first surface that each ray meets. Arguments and errors as for `occluded`."""
+        """Find the first surface that each ray meets. Arguments and errors as for `occluded`."""
         ...
 
 
 def paired(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Both as (n, 3) NumPy arrays; one that all rays share is repeated without a copy."""
+    """Give both as (n, 3) NumPy arrays; one that all rays share is repeated without a copy."""
     arrays = {"origins": np.asarray(origins), "directions": np.asarray(directions)}
     for name, array in arrays.items():
         if array.ndim not in (1, 2) or array.shape[-1] != 3:
@@ -67,7 +94,7 @@ def paired(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def limits_of(max_distance: Any, count: int) -> np.ndarray:
-    """One float32 limit for each ray; one that all share is repeated without a copy."""
+    """Give one float32 limit for each ray; one that all share is repeated without a copy."""
     if np.ndim(max_distance) not in (0, 1) or np.size(max_distance) not in (1, count):
         raise ValueError(
             f"max_distance must be a number or have shape ({count},), one for each ray, "
@@ -81,7 +108,7 @@ def limits_of(max_distance: Any, count: int) -> np.ndarray:
 def prepared(
     origins: np.ndarray, directions: np.ndarray, part: slice
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One chunk as Embree wants it: contiguous float32, directions of unit length."""
+    """Give one chunk as Embree wants it: contiguous float32, directions of unit length."""
     start = np.ascontiguousarray(origins[part], np.float32)
     shared = directions.strides[0] == 0  # Embree's binding takes one row for all rays
     towards = directions[:1] if shared else directions[part]
@@ -107,7 +134,7 @@ def prepared(
 
 
 def _squared(vectors: np.ndarray) -> np.ndarray:
-    """Squared lengths; several times as fast as `einsum` over three columns."""
+    """Compute squared lengths; several times as fast as `einsum` over three columns."""
     x, y, z = vectors.T
     with np.errstate(over="ignore", invalid="ignore"):  # the caller looks at what comes out
         return x * x + y * y + z * z

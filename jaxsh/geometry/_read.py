@@ -1,4 +1,4 @@
-"""Mesh files: parsed by trimesh, and checked against what they say they hold."""
+"""Mesh files: parsed by trimesh, and checked against the counts that they announce."""
 
 import io
 import os
@@ -46,6 +46,17 @@ def read_mesh(path: str | os.PathLike[str], *, up: Literal["z", "y"] = "z") -> M
     Raises `FileNotFoundError` for a missing file, and `ValueError`, naming the file and the
     problem, for an unknown extension, a damaged or truncated file, and one without faces. An OBJ
     file does not say how much it holds: cut off between two lines it cannot be told from a whole.
+    Raises `ImportError` where trimesh, which parses, cannot be imported.
+
+    **Example**
+
+    >>> import pathlib, tempfile
+    >>> from jaxsh import geometry
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "triangle.obj"
+    ...     _ = path.write_text("v 0 0 0\\nv 1 0 0\\nv 0 1 0\\nf 1 2 3\\n")
+    ...     geometry.read_mesh(path).vertices.shape
+    (3, 3)
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -103,7 +114,7 @@ def _parse(data: bytes, suffix: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _plain_obj(data: bytes) -> bytes:
-    """Only positions and faces, absolutely indexed: trimesh splits vertices at texture seams."""
+    """Keep positions and faces, absolutely indexed: trimesh splits vertices at texture seams."""
     text = data.decode("utf-8", errors="replace").replace("\\\n", " ").replace("\\\r\n", " ")
     lines, count = [], 0
     for number, line in enumerate(text.splitlines(), start=1):
@@ -129,7 +140,7 @@ def _plain_obj(data: bytes) -> bytes:
 
 
 def _announced(data: bytes, suffix: str) -> tuple[int, int] | None:
-    """Numbers of vertices and faces that a file says it holds: parsers take less for an answer.
+    """Read the numbers of vertices and faces that a file announces: parsers accept fewer.
 
     None for glTF, whose parser checks the length of every chunk. Raises `ValueError` where the
     file is plainly too short.
@@ -166,7 +177,7 @@ def _announced(data: bytes, suffix: str) -> tuple[int, int] | None:
 
 
 def _text_facets(data: bytes) -> int:
-    """How many facets a text STL, in lower case, holds, if it holds nothing else."""
+    """Count the facets of a text STL, in lower case, if it holds nothing else."""
     rest, facets = _STL_FACET.subn(b"", re.sub(rb"(?m)^[ \t]*(?:end)?solid\b.*$", b"", data))
     if b"facet" not in data:
         raise ValueError("it is neither text nor as long as its number of facets")

@@ -1,19 +1,28 @@
-"""What a mesh is as a surface: its pieces, its rims, and where it is no surface."""
+"""Connectivity of a mesh: its neighbors, pieces and rims, and where it is no surface."""
 
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Int
 
 from ._mesh import Mesh
 
 
 class Topology(NamedTuple):
-    """Counts of what a mesh is made of; `str` says them in one sentence.
+    """Counts the parts of a mesh; `str` says them in one sentence.
 
     An edge is on the boundary where one face has it, and non-manifold where more than two do. A
     vertex is non-manifold where the faces around it form more than one fan, as at the tip of two
     cones. Winding is inconsistent at an edge that its two faces run along in the same direction.
     Loops of the boundary that meet at a non-manifold edge count as one.
+
+    **Example**
+
+    >>> from jaxsh import geometry
+    >>> knot = geometry.topology(geometry.knot(300))
+    >>> knot.closed, knot.manifold, knot.genus, knot.euler
+    (True, True, 1, 0)
     """
 
     vertices: int  # those in a face
@@ -28,22 +37,22 @@ class Topology(NamedTuple):
 
     @property
     def euler(self) -> int:
-        """The Euler characteristic: vertices − edges + faces."""
+        """Euler characteristic: vertices − edges + faces."""
         return self.vertices - self.edges + self.faces
 
     @property
     def closed(self) -> bool:
-        """Whether no edge is on the boundary."""
+        """True if no edge is on the boundary."""
         return self.boundary_edges == 0
 
     @property
     def manifold(self) -> bool:
-        """Whether it is everywhere a surface, with or without boundary."""
+        """True if it is everywhere a surface, with or without boundary."""
         return self.nonmanifold_edges == 0 and self.nonmanifold_vertices == 0
 
     @property
     def genus(self) -> int | None:
-        """The handles of all components; None where it is no consistently wound manifold."""
+        """Handles of all components; None where it is no consistently wound manifold."""
         if not self.manifold or self.inconsistent_edges:
             return None
         return self.components - (self.euler + self.boundary_loops) // 2
@@ -71,7 +80,15 @@ def topology(mesh: Mesh) -> Topology:
 
     Nothing else in `geometry` looks: an open mesh is as good as a closed one to cast rays at, and
     a non-manifold one has normals and neighbors too. Faces that name a vertex twice are left
-    out. Not differentiable, and not under `jit`: the answer is Python numbers.
+    out. Runs on the host, outside `jit`: the answer is Python numbers. Not differentiable.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import geometry
+    >>> found = geometry.topology(geometry.make_mesh(np.eye(3), np.array([[0, 1, 2]])))
+    >>> found.closed, found.boundary_edges, found.euler
+    (False, 3, 1)
     """
     faces = np.asarray(mesh.faces, np.int64)
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
@@ -115,8 +132,40 @@ def topology(mesh: Mesh) -> Topology:
     )
 
 
+def neighbors(mesh: Mesh) -> Int[Array, "v n"]:
+    """List for each vertex the vertices that an edge joins to it, ascending: (v, n), int32.
+
+    n is the largest valence. A row with fewer than n neighbors is filled up with the vertex itself.
+    So a gather needs no mask, and `active | active[neighbors(mesh)].any(axis=1)` is one step of a
+    breadth-first search (Lee & Kim 2014). Real neighbors are where the entry differs from its row's
+    number.
+
+    Takes any mesh: open, non-manifold, in pieces; `topology` tells which. Runs on the host: the
+    faces must be concrete, since n depends on them, so call it outside `jit`. Not differentiable.
+
+    **Example**
+
+    >>> from jaxsh import geometry
+    >>> geometry.neighbors(geometry.knot(300)).shape
+    (300, 6)
+    """
+    faces, count = np.asarray(mesh.faces, np.int64), len(mesh.vertices)
+    ahead = faces[:, [1, 2, 0]]
+    # Both ways along each edge, as one number that sorts by vertex first.
+    keys = np.concatenate([(faces * count + ahead).ravel(), (ahead * count + faces).ravel()])
+    keys = np.sort(keys)
+    keys = keys[np.diff(keys, prepend=-1) > 0]
+    vertex, other = np.divmod(keys, max(count, 1))
+    vertex, other = vertex[vertex != other], other[vertex != other]
+    valence = np.bincount(vertex, minlength=count)
+    first = np.cumsum(valence) - valence
+    table = np.repeat(np.arange(count, dtype=np.int32)[:, None], valence.max(initial=0), axis=1)
+    table[vertex, np.arange(len(vertex)) - first[vertex]] = other
+    return jnp.asarray(table)
+
+
 def _groups(one: np.ndarray, two: np.ndarray, *, number: int) -> tuple[int, np.ndarray]:
-    """How many groups links between `number` things make of them, and the group of each thing."""
+    """Count the groups that links between `number` things make of them; label each thing."""
     from scipy.sparse import coo_array, csgraph  # JAX itself needs SciPy
 
     links = coo_array((np.ones(len(one), np.int8), (one, two)), shape=(number, number))
@@ -125,7 +174,7 @@ def _groups(one: np.ndarray, two: np.ndarray, *, number: int) -> tuple[int, np.n
 
 
 def _many(count: int, what: str) -> str:
-    """The count with its noun, in the plural where it wants one."""
+    """Say the count with its noun, in the plural where it wants one."""
     if count != 1:
         noun, *rest = what.split(" with ")
         noun = noun[:-2] + "ices" if noun.endswith("vertex") else noun + "s"

@@ -1,4 +1,4 @@
-"""Where a ray meets a triangle, without a crack between two that share an edge."""
+"""Intersection of a ray with a triangle, without a crack between two that share an edge."""
 
 import functools
 
@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Float
 def meet(
     corners: Float[Array, "n 9"], origin: Float[Array, "3 n"], direction: Float[Array, "3 n"]
 ) -> tuple[Bool[Array, " n"], Float[Array, " n"], list[Float[Array, " n"]]]:
-    """Whether each line meets its triangle, at which distance, and the barycentric weights.
+    """Tell whether each line meets its triangle, at which distance, and the barycentric weights.
 
     Woop, Benthin & Wald 2013: shear space so that the ray runs along one axis from the origin and
     ask on which side of each edge the origin lies. Signs are comparisons of two products, not

@@ -7,11 +7,9 @@ numbers differentiates; what touches files or casts rays does not.
 
 from ._backdrop import backdrop, look_up
 from ._camera import Camera
-from ._compare import psnr
-from ._display import auto_exposure, srgb_decode, srgb_encode, tone_map
-from ._environment import read_environment
+from ._display import auto_exposure, psnr, srgb_decode, srgb_encode, tone_map
+from ._environment import read_environment, studio
 from ._raster import Raster, interpolate, rasterize
-from ._studio import studio
 from ._write import write_image
 
 __all__ = [

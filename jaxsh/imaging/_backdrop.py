@@ -1,4 +1,4 @@
-"""A lat-long environment seen along directions, and behind what a camera sees."""
+"""Lat-long environments seen along directions, and behind what a camera sees."""
 
 import equinox as eqx
 import jax
@@ -12,13 +12,25 @@ from ._camera import Camera
 def look_up(
     environment: Float[Array, "height width c"], directions: Float[Array, "*shape 3"]
 ) -> Float[Array, "*shape c"]:
-    """Radiance of a lat-long picture along directions: bilinear, wrapped in φ, whole at the poles.
+    """Look up the radiance of a lat-long picture along directions: bilinear, wrapped in φ.
 
-    Directions need no unit length, if their squares stay in range; zero is taken for +z. Between
-    the outermost pixel centers and a pole the look-up runs to the mean of the outermost row, so
-    that the pole has one value from all sides. Has the dtype of `environment`. Linear and
-    differentiable in it; in the directions too, with kinks between pixels, where a slope is that
-    of one side, and zero slope at the poles.
+    `environment` (height, width, c) and directions (..., 3) give (..., c) in the dtype of
+    `environment`. Directions need no unit length, if their squares stay in range; zero is taken
+    for +z. Between the outermost pixel centers and a pole the look-up runs to the mean of the
+    outermost row, so that the pole has one value from all sides. Raises `ValueError` for wrong
+    shapes.
+
+    Linear and differentiable in `environment`; in the directions too, with kinks between pixels,
+    where a slope is that of one side, and zero slope at the poles. Runs under `jit` and `vmap`;
+    shards over the leading axis of the directions, where `environment` is whole on each device.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import imaging
+    >>> up_and_front = jnp.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    >>> imaging.look_up(imaging.studio(16, 32), up_and_front).shape
+    (2, 3)
     """
     if environment.ndim != 3 or directions.ndim == 0 or directions.shape[-1] != 3:
         raise ValueError(
@@ -29,9 +41,17 @@ def look_up(
 
 
 def backdrop(environment: Float[Array, "height width c"], camera: Camera) -> Float[Array, "h w c"]:
-    """The environment as the camera sees it through its pixel centers, for `interpolate`.
+    """Show the environment as the camera sees it through its pixel centers, for `interpolate`.
 
-    Differentiable as `look_up`, in the environment and in the camera.
+    Gives (camera.height, camera.width, c) in the dtype of `environment`. Differentiable as
+    `look_up`, in the environment and in the camera.
+
+    **Example**
+
+    >>> from jaxsh import imaging
+    >>> camera = imaging.Camera((0.0, -2.0, 0.0), (0.0, 0.0, 0.0), width=6, height=4)
+    >>> imaging.backdrop(imaging.studio(16, 32), camera).shape
+    (4, 6, 3)
     """
     return _backdrop(environment, camera)
 

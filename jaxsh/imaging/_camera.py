@@ -18,11 +18,19 @@ def _point(x: Any) -> Array:
 
 
 class Camera(eqx.Module):
-    """A pinhole at `position` that looks at `target`, with `up` upwards in the picture.
+    """Holds a pinhole camera at `position` that looks at `target`, `up` upwards in the picture.
 
     `fov_y` is the whole vertical angle of view in degrees; pixels are square. Vectors may be
     given as tuples. Raises `ValueError` for a picture without pixels, an angle outside (0, 180),
     and, where values are concrete, a view direction that is zero or along `up`.
+
+    **Example**
+
+    >>> from jaxsh import imaging
+    >>> camera = imaging.Camera((0.0, -2.0, 0.0), (0.0, 0.0, 0.0), width=4, height=2)
+    >>> origins, directions = camera.rays()
+    >>> origins.shape, directions.shape
+    ((8, 3), (8, 3))
     """
 
     position: Float[Array, " 3"] = eqx.field(converter=_point)
@@ -63,10 +71,18 @@ class Camera(eqx.Module):
         height: int = 512,
         margin: float = 0.05,
     ) -> "Camera":
-        """The camera that sees `mesh` from the direction `toward`, as large as fits the picture.
+        """Place a camera that sees `mesh` from the direction `toward`, filling the picture.
 
         `toward` points from the mesh to the camera (default: from its front, -y, and a little
         above). `margin` is the share of the picture's half width or height left free around it.
+        Runs on the host, outside `jit`.
+
+        **Example**
+
+        >>> from jaxsh import geometry, imaging
+        >>> camera = imaging.Camera.facing(geometry.knot(300), width=8, height=8)
+        >>> bool(imaging.rasterize(geometry.knot(300), camera).mask.any())
+        True
         """
         aim = cls(position=toward, target=(0, 0, 0), fov_y=fov_y, width=width, height=height)
         right, upward, forward = np.asarray(aim._axes(), np.float64)
@@ -91,10 +107,10 @@ class Camera(eqx.Module):
         )
 
     def rays(self) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
-        """Origins and unit directions through the pixel centers: row by row from the top left.
+        """Compute origins and unit directions through the pixel centers, rows from the top left.
 
         n is height · width; dtype that of `position`. Differentiable in every field that is not
-        a size.
+        a size. Shards over a batch of cameras (`vmap`), not over the pixels of one.
         """
         right, upward, forward = self._axes()
         dtype = self.position.dtype
@@ -108,7 +124,7 @@ class Camera(eqx.Module):
         return jnp.broadcast_to(self.position[None], directions.shape), directions
 
     def _axes(self) -> tuple[Array, Array, Array]:
-        """Unit vectors to the right, upwards and forward in the picture."""
+        """Compute unit vectors to the right, upwards and forward in the picture."""
         forward = _unit(self.target.astype(self.position.dtype) - self.position)
         right = _unit(jnp.cross(forward, self.up.astype(forward.dtype)))
         return right, jnp.cross(right, forward), forward
@@ -119,7 +135,7 @@ def _unit(x: Array) -> Array:
 
 
 def _center(x: np.ndarray, depth: np.ndarray) -> float:
-    """The c from which the outermost (x - c) / depth to both sides are equally far out."""
+    """Find the c from which the outermost (x - c) / depth to both sides are equally far out."""
     c = 0.0
     for _ in range(16):  # finds the two outermost in a few steps, then stays
         out = (x - c) / depth

@@ -1,4 +1,4 @@
-"""From linear radiance to what a screen shows."""
+"""Tone curves from linear radiance to what a screen shows, and the distance of two pictures."""
 
 import functools
 import math
@@ -17,10 +17,18 @@ _LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec. 709
 
 @jax.jit
 def srgb_encode(linear: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
-    """Linear light in [0, 1] to sRGB's signal (IEC 61966-2-1), the exact two-part curve.
+    """Encode linear light in [0, 1] as sRGB's signal (IEC 61966-2-1), by the exact two-part curve.
 
-    Below 0 the linear part goes on, above 1 the power. Gradients are finite everywhere; the
-    curve has its small standard kink (and step, 3e-8) at 0.0031308.
+    Takes any shape. Below 0 the linear part goes on, above 1 the power. Differentiable, with
+    finite gradients everywhere; the curve has its small standard kink (and step, 3e-8) at
+    0.0031308.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import imaging
+    >>> round(float(imaging.srgb_encode(jnp.asarray(0.18))), 3)
+    0.461
     """
     low = linear <= 0.0031308
     power = jnp.where(low, 0.0031308, linear) ** (1 / 2.4)
@@ -29,7 +37,17 @@ def srgb_encode(linear: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
 
 @jax.jit
 def srgb_decode(signal: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
-    """The inverse of `srgb_encode`: sRGB's signal to linear light."""
+    """Decode sRGB's signal to linear light: the inverse of `srgb_encode`.
+
+    Takes any shape. Differentiable, with the same kink.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import imaging
+    >>> round(float(imaging.srgb_decode(jnp.asarray(0.5))), 3)
+    0.214
+    """
     low = signal <= 0.04045
     power = ((jnp.where(low, 0.04045, signal) + 0.055) / 1.055) ** 2.4
     return jnp.where(low, signal / 12.92, power)
@@ -42,17 +60,26 @@ def tone_map(
     curve: Literal["clip", "reinhard"] = "clip",
     white: float | Float[Array, ""] = math.inf,
 ) -> Float[Array, "*shape"]:
-    """Linear radiance, times `exposure`, through a curve to [0, 1] and encoded as sRGB.
+    """Map linear radiance, times `exposure`, by a curve to [0, 1], and encode it as sRGB.
 
     "clip" cuts at 1. "reinhard" takes the exposed luminance L (Rec. 709) to L (1 + L/white²) /
     (1 + L) and keeps the ratios of R, G, B, which are in the last axis; `white` is the least
     luminance that becomes 1, and with the default, infinity, none does (Reinhard et al. 2002,
-    eq. 4 and 3, without the paper's scaling to the picture's key: that is `exposure`). What is
-    still outside [0, 1], as a saturated color may be, is clipped, negative light before the curve.
+    eq. 4 and 3, without the paper's scaling to the picture's key: that is `exposure`). Values
+    still outside [0, 1], as in a saturated color, are clipped; negative light before the curve.
 
     Differentiable in image, exposure and white; the gradient is zero where the result is clipped.
+    Pixel by pixel, so it shards along any axis but the colors'.
     Raises `ValueError` for an unknown curve, a last axis that is not R, G, B, and, where it is
     concrete, a white that is not above 0.
+
+    **Example**
+
+    >>> from jaxsh import imaging
+    >>> image = imaging.studio(8, 16)
+    >>> shown = imaging.tone_map(image, imaging.auto_exposure(image), curve="reinhard")
+    >>> shown.shape, bool((shown <= 1).all())
+    ((8, 16, 3), True)
     """
     if curve not in ("clip", "reinhard"):
         raise ValueError(f'curve must be "clip" or "reinhard", got {curve!r}')
@@ -87,10 +114,19 @@ def auto_exposure(
     mask: Bool[Array, "h w"] | None = None,
     percentile: float = 99.0,
 ) -> Float[Array, ""]:
-    """The exposure that takes a percentile of the pixels' largest channel to 1.
+    """Choose the exposure that takes a percentile of the pixels' largest channel to 1.
 
-    Over the pixels of `mask` where given. 1 where that percentile is not above zero, or there is
-    no pixel. Differentiable in the image.
+    Over the pixels of `mask` (h, w) where given. 1 where that percentile is not above zero, or
+    there is no pixel. Raises `ValueError` for a percentile outside [0, 100]. Differentiable in the
+    image. One number for a whole picture: where its rows are shared out they are gathered, for a
+    percentile wants all pixels together (a batch by `vmap` shards); inside `shard_map` it is that
+    of the rows at hand.
+
+    **Example**
+
+    >>> from jaxsh import imaging
+    >>> imaging.auto_exposure(imaging.studio(8, 16), percentile=90.0).shape
+    ()
     """
     if not 0 <= percentile <= 100:
         raise ValueError(f"percentile must be between 0 and 100, got {percentile}")
@@ -105,3 +141,35 @@ def _auto_exposure(image, mask, percentile: float) -> Float[Array, ""]:
         brightest = jnp.where(mask, brightest, jnp.nan)
     level = jnp.nanpercentile(brightest, percentile)
     return jnp.where(level > 0, 1 / jnp.where(level > 0, level, 1), 1)
+
+
+def psnr(
+    image: Float[Array, "h w c"],
+    reference: Float[Array, "h w c"],
+    mask: Bool[Array, "h w"] | None = None,
+    peak: float = 1.0,
+) -> Float[Array, ""]:
+    """Compute the peak signal-to-noise ratio in dB: 10 log10(peak² / mean squared error).
+
+    The mean is over the channels of the pixels in `mask` (h, w), or of all pixels; infinite where
+    the pictures are equal there, and NaN where the mask is empty. Differentiable in both pictures,
+    with zero gradient where they are equal. Rows may be shared out between devices; inside
+    `shard_map` it is the ratio of the rows at hand.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import imaging
+    >>> image = imaging.studio(8, 16)
+    >>> round(float(imaging.psnr(image, image + 0.1)), 3)
+    20.0
+    """
+    return _psnr(image, reference, mask, peak)
+
+
+@jax.jit
+def _psnr(image, reference, mask, peak) -> Float[Array, ""]:
+    squared = jnp.mean((image - reference) ** 2, axis=-1)
+    error = jnp.mean(squared, where=mask)
+    differs = error != 0
+    return jnp.where(differs, 10 * jnp.log10(peak**2 / jnp.where(differs, error, 1)), jnp.inf)

@@ -1,4 +1,4 @@
-"""Light probes from files."""
+"""Light probes: from files, and one built in."""
 
 import os
 import warnings
@@ -17,6 +17,14 @@ from ._resample import resample
 _MAX_HEIGHT = 8192
 
 File = str | os.PathLike[str]
+
+# Lobes exp(κ (cos γ - 1)) around a direction: (direction, κ, linear RGB at the center).
+_LOBES = (
+    ((-0.55, -0.62, 0.56), 600.0, (900.0, 800.0, 640.0)),  # sun: 2.3° to a standard deviation
+    ((0.80, -0.50, 0.32), 14.0, (1.9, 2.2, 2.8)),  # softbox: 15°, cool, opposite the sun
+    ((0.25, 0.93, 0.28), 40.0, (6.0, 4.2, 2.6)),  # rim light from behind: 9°, warm
+)
+_ZENITH, _HORIZON, _GROUND = (0.16, 0.26, 0.48), (0.62, 0.50, 0.38), (0.085, 0.07, 0.055)
 
 
 def read_environment(
@@ -63,7 +71,17 @@ def read_environment(
     the picture, and a `UserWarning` counts them. What lies outside an angular map's circle or a
     cross's cells is not looked at. Raises `FileNotFoundError` for a missing file and `ValueError`,
     naming the file and the problem, for any other fault: a damaged or truncated file, one that is
-    all black, another shape, an unknown option.
+    all black, another shape, an unknown option. Raises `ImportError` for .exr and .hdr where
+    OpenImageIO cannot be imported; .pfm and .npy need it not. Runs on the host.
+
+    **Example**
+
+    >>> import pathlib, tempfile
+    >>> from jaxsh import imaging
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = imaging.write_image(pathlib.Path(folder) / "a.exr", imaging.studio(8, 16))
+    ...     imaging.read_environment(path).shape
+    (8, 16, 3)
     """
     axes = axes_of(layout, orientation)
     if height is not None and not 1 <= height <= _MAX_HEIGHT:
@@ -104,7 +122,7 @@ def _read(path: Path) -> Float[np.ndarray, "h w 3"]:
 def _checked(
     pixels: Float[np.ndarray, "h w 3"], used: Bool[np.ndarray, "h w"], repair: bool
 ) -> tuple[Float[np.ndarray, "h w 3"], str]:
-    """Pixels fit to be light, black where they are not used, and what had to be replaced."""
+    """Give pixels fit to be light, black where they are not used, and name what was replaced."""
     pixels = np.where(used[..., None], pixels, np.float32(0))
     nan, negative, infinite = np.isnan(pixels), pixels < 0, pixels == np.inf
     counts = {"NaN": nan, "negative": negative, "infinite": infinite}
@@ -117,3 +135,35 @@ def _checked(
     if not pixels.any():
         raise ValueError("the picture is all black")
     return pixels, faults
+
+
+def studio(height: int = 256, width: int = 512) -> Float[Array, "height width 3"]:
+    """Make up a light probe: linear radiance, lat-long, float32, positive and finite.
+
+    A dim sky, warm towards the horizon, over darker ground, with a small bright sun (peak 900,
+    upper left front for a viewer at -y), a softbox to the right and a rim light behind. The sun
+    is a smooth lobe 2.3° wide: from 128 rows on, pixels resolve it. Raises `ValueError` for a
+    picture without pixels.
+
+    **Example**
+
+    >>> from jaxsh import imaging
+    >>> imaging.studio(8, 16).shape
+    (8, 16, 3)
+    """
+    if height < 1 or width < 1:
+        raise ValueError(f"a picture needs pixels, got {width} × {height}")
+    theta = (np.arange(height)[:, None] + 0.5) * np.pi / height
+    phi = (np.arange(width) + 0.5) * 2 * np.pi / width
+    z = np.broadcast_to(np.cos(theta), (height, width))
+    directions = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), z], axis=-1)
+
+    elevation = np.clip(z, 0, 1)[..., None]
+    sky = _ZENITH + np.exp(-4 * elevation) * np.subtract(_HORIZON, _ZENITH)
+    # The horizon is a soft step, so that it rings no more than a real one.
+    above = 1 / (1 + np.exp(-z[..., None] / 0.03))
+    radiance = above * sky + (1 - above) * np.array(_GROUND)
+    for direction, kappa, color in _LOBES:
+        cosine = directions @ (np.array(direction) / np.linalg.norm(direction))
+        radiance = radiance + np.exp(kappa * (cosine - 1))[..., None] * np.array(color)
+    return jnp.asarray(radiance, jnp.float32)

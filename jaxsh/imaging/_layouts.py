@@ -1,4 +1,4 @@
-"""Pictures of the whole sphere: their shapes, which pixels count, and where a direction is seen.
+"""Pictures of the whole sphere: their shapes, their used pixels, and where a direction is seen.
 
 Each layout becomes tiles with a border of one pixel, so that bilinear look-up needs no cases, and
 a function from directions to places on them. Directions are along the picture's own axes: to its
@@ -43,7 +43,7 @@ Places = tuple[Int[np.ndarray, " n"], Float[np.ndarray, " n"], Float[np.ndarray,
 
 
 class Tiles(NamedTuple):
-    """A picture of the sphere, ready to be looked up."""
+    """Holds a picture of the sphere, ready to be looked up."""
 
     pixels: Float[np.ndarray, "tiles h w 3"]  # with a border of one pixel
     around: int  # pixels on a great circle
@@ -52,7 +52,7 @@ class Tiles(NamedTuple):
 
 
 def check_shape(layout: str, height: int, width: int) -> None:
-    """Refuses a picture that cannot be of that layout, and says of which it could be."""
+    """Refuse a picture that cannot be of that layout, and name the layout that it could be."""
     if _fits(layout, height, width):
         return
     others = [other for other in _SHAPES if _fits(other, height, width)]
@@ -64,7 +64,7 @@ def check_shape(layout: str, height: int, width: int) -> None:
 
 
 def used_pixels(layout: str, height: int, width: int) -> np.ndarray:
-    """(height, width) bool: False in a cross's empty cells and outside an angular map's circle."""
+    """Mark the pixels used: False in a cross's empty cells and outside an angular map's circle."""
     if layout == "lat-long":
         return np.ones((height, width), bool)
     if layout == "angular-map":
@@ -76,7 +76,7 @@ def used_pixels(layout: str, height: int, width: int) -> np.ndarray:
 
 
 def tiles(layout: str, image: Float[np.ndarray, "h w 3"]) -> Tiles:
-    """The picture of a layout as tiles; pixels that are not used are not looked at."""
+    """Cut the picture of a layout into tiles; pixels that are not used are not looked at."""
     if layout == "lat-long":
         return _lat_long(image)
     if layout == "angular-map":
@@ -116,7 +116,7 @@ def _lat_long(image: np.ndarray) -> Tiles:
 
 
 def _radius(size: int) -> np.ndarray:
-    """Of the pixels' centers in an angular map, 1 on its circle."""
+    """Compute the radius of each pixel center in an angular map, 1 on its circle."""
     center = (2 * np.arange(size) + 1) / size - 1
     return np.hypot(center[:, None], center)
 

@@ -1,4 +1,4 @@
-"""Where a picture's own axes stand in ours."""
+"""Orientation of a picture's own axes in ours."""
 
 import numpy as np
 from jaxtyping import Float
@@ -33,7 +33,7 @@ LAYOUTS = tuple(_LANDS)
 
 
 def axes_of(layout: str, orientation: str) -> Float[np.ndarray, "3 3"]:
-    """Rows: where the picture's first, second and third axis land in ours."""
+    """Look up, row by row, where the picture's first, second and third axis land in ours."""
     if layout not in _LANDS:
         raise ValueError(f"layout must be one of {LAYOUTS}, got {layout!r}")
     if orientation not in _LANDS[layout]:
@@ -50,7 +50,7 @@ def axes_of(layout: str, orientation: str) -> Float[np.ndarray, "3 3"]:
 def turn_columns(
     image: Float[np.ndarray, "h w 3"], axes: Float[np.ndarray, "3 3"]
 ) -> Float[np.ndarray, "h w 3"]:
-    """A lat-long picture with its columns in our order: flipped, rolled, never resampled.
+    """Bring the columns of a lat-long picture into our order: flipped, rolled, never resampled.
 
     A roll by half a column, which a quarter turn of an odd number of rows asks for, gives each
     pixel the mean of the two that it overlaps: the integral stays, detail is lost.

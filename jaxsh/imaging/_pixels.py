@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from ._raw import read_npy, read_pfm
-from ._rgbe import check_length
+from ._raw import check_length, read_npy, read_pfm
 
 FORMATS = (".exr", ".hdr", ".pfm", ".npy")
 # The best that the compression of these formats can do is some hundred numbers in a byte.
@@ -16,7 +15,7 @@ _MAX_PIXELS = 1 << 28  # 3 GB of them
 
 
 def read_pixels(path: Path) -> Float[np.ndarray, "h w 3"]:
-    """Float32 pixels as stored, row 0 on top. Raises `ValueError` for what is not a whole picture.
+    """Read float32 pixels as stored, row 0 on top. Raises `ValueError` for an incomplete picture.
 
     The error does not name the file; that is for the caller, as is a missing file.
     """
@@ -39,7 +38,7 @@ def read_pixels(path: Path) -> Float[np.ndarray, "h w 3"]:
 
 
 def _decode(path: Path) -> np.ndarray:
-    """By OpenImageIO, which may stop halfway and say so later."""
+    """Decode by OpenImageIO, which may stop halfway and report it later."""
     try:
         import OpenImageIO as oiio
     except ImportError as error:
@@ -91,7 +90,7 @@ def _check_form(spec: Any, size: int) -> None:
 
 
 def _channels(names: list[str]) -> list[int]:
-    """Where R, G, B are; one gray channel stands for all three."""
+    """Find R, G, B; one gray channel stands for all three."""
     found = {name.upper(): i for i, name in reversed(list(enumerate(names)))}
     if all(c in found for c in "RGB"):
         return [found[c] for c in "RGB"]

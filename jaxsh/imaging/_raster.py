@@ -1,4 +1,4 @@
-"""Which face each pixel sees, and colors carried from vertices to pixels."""
+"""Faces that pixels see, and colors carried from vertices to pixels."""
 
 import dataclasses
 import functools
@@ -22,7 +22,16 @@ _rays = eqx.filter_jit(Camera.rays)
 class Raster(eqx.Module):
     """Holds what the samples of each pixel see of a mesh: n × n of them, for a picture of h × w.
 
-    With one sample, its pixel's center, the rows and columns are those of the picture.
+    With one sample, its pixel's center, the rows and columns are those of the picture. Made by
+    `rasterize`, drawn with `interpolate`.
+
+    **Example**
+
+    >>> from jaxsh import geometry, imaging
+    >>> mesh = geometry.knot(300)
+    >>> raster = imaging.rasterize(mesh, imaging.Camera.facing(mesh, width=8, height=6))
+    >>> raster.alpha.shape, raster.mask.dtype.name
+    ((6, 8), 'bool')
     """
 
     face: Int[Array, "hn wn"]  # index into `faces`, -1 for background; int32

@@ -1,4 +1,4 @@
-"""Pictures stored as plain floats: .pfm and .npy. Every byte is accounted for."""
+"""File formats read byte by byte: .pfm and .npy, and where the pixels of an .hdr file end."""
 
 import io
 import math
@@ -12,9 +12,9 @@ _PFM = re.compile(rb"P([Ff])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]{1,32})[ \t\r]*
 
 
 def read_pfm(data: bytes) -> Float[np.ndarray, "h w c"]:
-    """A portable float map, color (PF) or gray (Pf), its rows turned to run downwards.
+    """Read a portable float map, color (PF) or gray (Pf), its rows turned to run downwards.
 
-    The sign of the header's scale says the order of bytes; its size is a unit and is not applied.
+    The sign of the header's scale gives the order of bytes; its size is a unit and is not applied.
     """
     header = _PFM.match(data)
     if header is None:
@@ -32,7 +32,7 @@ def read_pfm(data: bytes) -> Float[np.ndarray, "h w c"]:
 
 
 def read_npy(data: bytes) -> Shaped[np.ndarray, "h w c"]:
-    """A NumPy file of float16, 32 or 64 with shape (h, w, 3) or (h, w)."""
+    """Read a NumPy file of float16, 32 or 64 with shape (h, w, 3) or (h, w)."""
     stream = io.BytesIO(data)
     try:
         version = np.lib.format.read_magic(stream)
@@ -59,3 +59,35 @@ def _numbers(body: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarray
     if len(body) != size:
         raise ValueError(f"damaged: shape {shape} takes {size} bytes, but {len(body)} are there")
     return np.frombuffer(body, dtype)
+
+
+def check_length(data: bytes, height: int, width: int) -> None:
+    """Refuse an .hdr file that goes on after its last pixel, as one does whose height is wrong.
+
+    Decoders stop after the rows that the header announces, whatever follows. `data` is a file that
+    one has read to its end without complaint.
+    """
+    try:
+        place = data.index(b"\n", data.index(b"\n\n") + 2) + 1  # after the header and the size
+        for _ in range(height):
+            place = _after_row(data, place, width)
+    except (IndexError, ValueError) as error:
+        raise ValueError("damaged: its header or its rows do not end where they should") from error
+    if place != len(data):
+        raise ValueError(f"damaged: {width} × {height} pixels end at byte {place} of {len(data)}")
+
+
+def _after_row(data: bytes, place: int, width: int) -> int:
+    start = data[place : place + 4]
+    coded = 8 <= width <= 0x7FFF and start[:2] == b"\2\2" and start[2] < 128
+    if not coded:
+        return place + 4 * width
+    place += 4
+    for _ in range(4):  # red, green, blue and exponent, each in runs and literals
+        column = 0
+        while column < width:
+            count = data[place]
+            run = count > 128
+            column += count - 128 if run else count
+            place += 2 if run else count + 1
+    return place

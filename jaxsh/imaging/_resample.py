@@ -1,4 +1,4 @@
-"""From any picture of the sphere to a lat-long one, each pixel the mean over its solid angle."""
+"""Resampling any picture of the sphere to a lat-long one, by means over solid angles."""
 
 import math
 
@@ -20,9 +20,9 @@ def resample(
     axes: Float[np.ndarray, "3 3"],
     height: int | None,
 ) -> Float[np.ndarray, "height width 3"]:
-    """A lat-long picture in our orientation, `height` rows of twice as many columns, float32.
+    """Resample to a lat-long picture in our orientation, `height` rows of twice as many columns.
 
-    By default as many columns as the source has pixels on a great circle, up to 2048 rows.
+    By default as many columns as the source has pixels on a great circle, up to 2048 rows; float32.
     Each pixel is the mean of n × n samples of equal solid angle, bilinear in the source, with n
     such that there are two or more to a source pixel along each side (4 ≤ n ≤ 64).
     """

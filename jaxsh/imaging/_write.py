@@ -1,4 +1,4 @@
-"""Pictures to files."""
+"""Writing pictures to files."""
 
 import os
 from pathlib import Path
@@ -21,8 +21,18 @@ def write_image(
     keeps 8 bits of the largest channel and no negative values. .jpg and .hdr have no alpha, and
     alpha is not multiplied into colors. Makes missing folders and returns the path.
 
-    Raises `ValueError` for NaN or infinite values, shapes and extensions it does not know, and
-    `OSError` where the file cannot be written.
+    Raises `ValueError` for NaN or infinite values, shapes and extensions it does not know,
+    `OSError` where the file cannot be written, and `ImportError` where OpenImageIO cannot be
+    imported. Runs on the host.
+
+    **Example**
+
+    >>> import pathlib, tempfile
+    >>> from jaxsh import imaging
+    >>> image = imaging.tone_map(imaging.studio(8, 16))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     imaging.write_image(pathlib.Path(folder) / "a" / "probe.png", image).name
+    'probe.png'
     """
     path, pixels = Path(path), np.asarray(image)
     suffix = path.suffix.lower()
