@@ -46,6 +46,11 @@ def test_the_lower_modules_load_without_readers_and_solvers():
     assert not top_level(added) & (HEAVY - {"equinox"})
 
 
+def test_the_stored_sky_needs_no_solver():
+    statement = "from jaxsh import sky; sky.preetham_harmonics([0.0, 0.0, 1.0], 3.0, 1)"
+    assert not top_level(measure(statement)["added"]) & (HEAVY - {"equinox"})
+
+
 def test_plots_choose_no_backend_and_load_no_window():
     added = measure("import jaxsh.plot, matplotlib")["added"]
     assert {"jaxsh.imaging", "jaxsh.sphere"} <= set(added)

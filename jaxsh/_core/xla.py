@@ -1,5 +1,6 @@
 """Control over what XLA fuses and in what pieces it computes."""
 
+import itertools
 import math
 from typing import Any
 
@@ -43,28 +44,35 @@ def materialize(function, *arguments):
     return jax.lax.platform_dependent(*arguments, cpu=conditional, default=function)
 
 
-def in_blocks(function, *arrays, size: int):
+def in_blocks(function, *arrays, size: int, most: int | None = None):
     """`function(*arrays)`, where rows of the leading axis do not depend on each other.
 
     On one CPU it runs block by block of `size` rows, whose intermediate values stay in cache, and
     on two or more devices or an accelerator in one call, since a loop would leave them idle. The
     result is the same to rounding. Differentiable: each block is computed anew in reverse mode.
+
+    `most` is the number of rows of one call on an accelerator, where each needs so much memory
+    that all together might not fit.
     """
     rows = arrays[0].shape[0]
 
-    def blocks(*arrays):
-        def cut(array):
-            padding = [(0, -rows % size)] + [(0, 0)] * (array.ndim - 1)
-            return jnp.pad(array, padding, mode="edge").reshape(-1, size, *array.shape[1:])
+    def blocks_of(size):
+        def blocks(*arrays):
+            def cut(array):
+                padding = [(0, -rows % size)] + [(0, 0)] * (array.ndim - 1)
+                return jnp.pad(array, padding, mode="edge").reshape(-1, size, *array.shape[1:])
 
-        done = jax.lax.map(
-            jax.checkpoint(lambda block: function(*block)), tuple(cut(array) for array in arrays)
-        )
-        return jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[:rows], done)
+            done = jax.lax.map(lambda block: anew(*block), tuple(cut(array) for array in arrays))
+            return jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[:rows], done)
+
+        return blocks
 
     if rows <= size or on_mesh(arrays):
         return function(*arrays)
-    return jax.lax.platform_dependent(*arrays, cpu=blocks, default=function)
+    # The accelerator's way too: what it kept for reverse mode would take memory on the CPU as well.
+    anew = jax.checkpoint(function)
+    default = anew if most is None or rows <= most else blocks_of(most)
+    return jax.lax.platform_dependent(*arrays, cpu=blocks_of(size), default=default)
 
 
 def keep_rows(function, *arguments, like, axis: int, out) -> Any:
@@ -90,3 +98,28 @@ def keep_rows(function, *arguments, like, axis: int, out) -> Any:
 
     out = jax.tree.map(shard, out, is_leaf=lambda axis: axis is None)
     return jax.sharding.auto_axes(function, out_sharding=out)(*arguments)
+
+
+def keep_batch(function, *arrays, ndims: tuple[int, ...]):
+    """`function(*arrays)`, whose results lead with the batch that the arrays' leading axes make.
+
+    For arrays with explicit axes, as `keep_rows`, but for any number of batch axes, sharded as
+    those of the arguments are. `ndims` are the numbers of axes that do not belong to the batch.
+    """
+    types = [jax.typeof(array) for array in arrays]
+    meshes = [
+        t.sharding.mesh
+        for t in types
+        if jax.sharding.AxisType.Explicit in t.sharding.mesh.axis_types
+    ]
+    if not meshes:
+        return function(*arrays)
+    batches = [
+        (*t.sharding.spec, *[None] * t.ndim)[: t.ndim - n]
+        for t, n in zip(types, ndims, strict=True)
+    ]
+    # Aligned at their ends, as broadcasting does.
+    entries = itertools.zip_longest(*(reversed(batch) for batch in batches))
+    spec = [next((e for e in column if e is not None), None) for column in entries][::-1]
+    out = jax.sharding.NamedSharding(meshes[0], jax.sharding.PartitionSpec(*spec))
+    return jax.sharding.auto_axes(function, out_sharding=out)(*arrays)

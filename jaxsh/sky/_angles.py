@@ -1,12 +1,16 @@
 """Angles of sky and sun from directions, with derivatives that stay finite."""
 
-from typing import NamedTuple
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, as_float
+from .._core.xla import in_blocks, keep_batch, on_mesh
 from ..harmonics import degrees, orders
 
 
@@ -46,6 +50,56 @@ def directions(value: Float[ArrayLike, "*batch 3"], name: str) -> Float[Array, "
 def parameter(value: Float[ArrayLike, "*batch"], dtype) -> Float[Array, "*batch"]:
     """A model's number, one per sun, in the directions' dtype."""
     return as_float(value).astype(dtype)
+
+
+def each_sun(
+    function: Callable[..., Any],
+    sun: Float[Array, "*suns 3"],
+    *numbers: Float[Array, "..."],
+    size: int,
+    most: int,
+) -> Any:
+    """`function(sun, *numbers)` for each sun (3,) of a batch, with a scalar of each number.
+
+    Suns (..., 3) and numbers (...) broadcast. On the CPU `size` suns at a time, on an accelerator
+    at most `most` of them.
+    """
+
+    def all_of_one_axis(*arrays):
+        each = jax.vmap(function)
+        if on_mesh(arrays):  # in reverse, all is computed again rather than held, as in blocks
+            each = jax.checkpoint(each)
+        return in_blocks(each, *arrays, size=size, most=most)
+
+    return over_one_axis(all_of_one_axis, sun, *numbers)
+
+
+def over_one_axis(
+    function: Callable[..., Any], sun: Float[Array, "*suns 3"], *numbers: Float[Array, "..."]
+) -> Any:
+    """`function(suns, *numbers)`, which takes one axis (n, 3) and (n,), for those of any batch."""
+    batch = jnp.broadcast_shapes(sun.shape[:-1], *(n.shape for n in numbers))
+
+    def whole(*arrays):
+        first, *rest = arrays
+        arrays = widened((*batch, 3), first), *(widened(batch, n) for n in rest)
+        if on_mesh(arrays) and batch:
+            # Axis by axis: to make one axis of two would gather a sharded one.
+            by_axis = function
+            for _ in batch[1:]:
+                by_axis = jax.vmap(by_axis)
+            return by_axis(*arrays)
+        count = math.prod(batch)
+        done = function(*(array.reshape(count, *array.shape[len(batch) :]) for array in arrays))
+        return jax.tree.map(lambda a: a.reshape(*batch, *a.shape[1:]), done)
+
+    return keep_batch(whole, sun, *numbers, ndims=(1, *[0] * len(numbers)))
+
+
+def widened(shape: tuple[int, ...], array: Float[Array, "..."]) -> Float[Array, "..."]:
+    """Broadcast to a shape of the same or a higher rank."""
+    missing = len(shape) - array.ndim
+    return jnp.broadcast_to(array.reshape((1,) * missing + array.shape), shape)
 
 
 def unit(vector: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3"]:

@@ -1,5 +1,6 @@
 """The paper's measure of error, and the readings of the intensity that it is relative to."""
 
+import functools
 from typing import Literal, NamedTuple, get_args
 
 import jax
@@ -7,10 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float
+from .._core.checks import align, as_float, check_batches, check_degree
+from .._core.host import read_only_cache
 from .._core.linalg import matmul
 from ..sphere import reconstruct
-from ._angles import directions, parameter
+from ._angles import directions, each_sun, parameter
 from ._color import xyz_to_srgb
 from ._preetham import preetham_radiance
 from ._project import project_preetham
@@ -67,33 +69,34 @@ def smallest_luminance(
         raise ValueError(f"reading must be one of {', '.join(get_args(Reading))}, got {reading!r}")
     sun = directions(sun, "sun")
     turbidity = parameter(turbidity, sun.dtype)
-    batch = jnp.broadcast_shapes(sun.shape[:-1], turbidity.shape)
-    suns = jnp.broadcast_to(align(sun, jnp.zeros((*batch, 1)))[0], (*batch, 3)).reshape(-1, 3)
-    numbers = jnp.broadcast_to(align(turbidity, jnp.zeros(batch))[0], batch).reshape(-1)
-    views = _hemisphere(sun.dtype)
-    if reading == "harmonics":
-        coefficients = project_preetham(suns, numbers, degree, space="xyz", check="allow")
-        smallest = jax.lax.map(lambda c: reconstruct(c, views).min(axis=-1), coefficients[:, 1:2])
-    else:
-        luminance, channel = jax.lax.map(
-            lambda row: _smallest(views, *row), (suns, numbers), batch_size=16
-        )
-        smallest = channel if reading == "channel" else luminance
-    if reading == "range":
-        smallest = jnp.broadcast_to(smallest.min(), smallest.shape)
-    return jnp.broadcast_to(smallest, (len(suns), 3)).reshape(*batch, 3)
+    check_batches(sun=sun.shape, turbidity=(*turbidity.shape, 1))
+    return _smallest(sun, turbidity, reading, check_degree(degree))
 
 
-def _smallest(views, sun, turbidity):
-    xyz = preetham_radiance(views, sun, turbidity, space="xyz", check="allow")
-    srgb = matmul(xyz, jnp.asarray(xyz_to_srgb().T, xyz.dtype))
-    return xyz[:, 1:2].min(axis=0), srgb.min(axis=0)
+@functools.partial(jax.jit, static_argnames=("reading", "degree"))
+def _smallest(sun, turbidity, reading: Reading, degree: int):
+    views = jnp.asarray(_hemisphere(), sun.dtype)
+
+    def of_harmonics(sun, turbidity):
+        luminance = project_preetham(sun, turbidity, degree, space="xyz", check="allow")[1]
+        return jnp.broadcast_to(reconstruct(luminance, views).min(), (3,))
+
+    def of_radiance(sun, turbidity):
+        xyz = preetham_radiance(views, sun, turbidity, space="xyz", check="allow")
+        if reading == "channel":
+            return matmul(xyz, jnp.asarray(xyz_to_srgb().T, xyz.dtype)).min(axis=0)
+        return jnp.broadcast_to(xyz[:, 1].min(), (3,))
+
+    function, size = (of_harmonics, 1) if reading == "harmonics" else (of_radiance, 16)
+    smallest = each_sun(function, sun, turbidity, size=size, most=1024)
+    return jnp.full_like(smallest, smallest.min()) if reading == "range" else smallest
 
 
-def _hemisphere(dtype) -> Float[Array, "n 3"]:
+@read_only_cache(maxsize=None)
+def _hemisphere() -> Float[np.ndarray, "n 3"]:
     """From the zenith to the horizon itself, both included."""
     theta = np.linspace(0, np.pi / 2, _RINGS)[:, None]
     phi = 2 * np.pi * np.arange(_SPOKES) / _SPOKES
     z = np.broadcast_to(np.maximum(np.cos(theta), 0), (_RINGS, _SPOKES))
     views = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), z], axis=-1)
-    return jnp.asarray(views.reshape(-1, 3), dtype)
+    return views.reshape(-1, 3)

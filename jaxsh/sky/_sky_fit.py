@@ -11,10 +11,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, check_batches, check_degree, is_concrete
+from .._core.checks import check_batches, check_degree, is_concrete
 from .._core.linalg import einsum, matmul
 from ._angles import (
     directions,
+    over_one_axis,
     parameter,
     row_of_each,
     squared_zenith_angle,
@@ -139,24 +140,25 @@ def check_range(axes: tuple[Axis, ...], parity: bool, sun, numbers) -> None:
 
 @jax.jit
 def evaluate(fit: SkyFit, sun, parameters):
-    batch = jnp.broadcast_shapes(sun.shape[:-1], *(p.shape for p in parameters))
-    suns = _rows(unit(sun), (*batch, 3)).reshape(math.prod(batch), 3)
-    numbers = [_rows(p, batch).ravel() for p in parameters]
+    return over_one_axis(functools.partial(_evaluate, fit), unit(sun), *parameters)
+
+
+def _evaluate(fit: SkyFit, suns: Float[Array, "n 3"], *numbers: Float[Array, " n"]):
     x, y, z = suns.T
     height = (squared_zenith_angle if fit.parity else zenith_angle)(x, y, z)
     variables = [height, *numbers]
 
     channels, rows, *terms = fit.coefficients.shape
     basis = design(fit.axes, variables, terms)
-    series = fit.coefficients.reshape(channels * rows, len(basis)).astype(sun.dtype)
+    series = fit.coefficients.reshape(channels * rows, len(basis)).astype(suns.dtype)
     values = matmul(series, basis).reshape(channels, rows, len(x))
     if fit.prefactor is not None:
         values = values * fit.prefactor(suns, *numbers).T[:, None]
-    values = einsum("oc,crn->orn", fit.mix.astype(sun.dtype), values)
+    values = einsum("oc,crn->orn", fit.mix.astype(suns.dtype), values)
     turned = values[:, row_of_each(fit.degree)] * waves(x, y, fit.degree, smooth=fit.parity)[None]
     inside = jnp.stack([axis.holds(v) for axis, v in zip(fit.axes, variables, strict=True)])
     turned = jnp.where(inside.all(axis=0)[None, None], turned, jnp.nan)
-    return jnp.moveaxis(turned, -1, 0).reshape(*batch, len(fit.mix), len(turned[0]))
+    return jnp.moveaxis(turned, -1, 0)
 
 
 def design(axes, variables, terms) -> Float[Array, "terms n"]:
@@ -167,10 +169,6 @@ def design(axes, variables, terms) -> Float[Array, "terms n"]:
             for axis, value, count in zip(axes, variables, terms, strict=True)
         ]
     )
-
-
-def _rows(array, shape):
-    return jnp.broadcast_to(align(array, jnp.zeros(shape))[0], shape)
 
 
 def chebyshev(x: Float[Array, " n"], count: int) -> Float[Array, "count n"]:

@@ -1,0 +1,119 @@
+"""The sky on a mesh of devices: suns, views and lights keep their sharding."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from sharding import ROWS, WHOLE, check_sharded
+from suns import upper_directions
+
+from jaxsh import sky
+from jaxsh.sky import _hosek
+
+COUNT = 6
+
+
+@pytest.fixture
+def sky_of(rng):
+    """Views, suns and turbidities, one of each for a row."""
+    turbidity = rng.uniform(2.6, 5.9, COUNT)
+    return upper_directions(rng, COUNT), upper_directions(rng, COUNT), turbidity
+
+
+@pytest.fixture
+def hosek_tables(rng, monkeypatch):
+    """Numbers of the size of the model's own, whose file is in the wheel of another package."""
+    tables = rng.uniform(0.1, 0.5, size=(10, 2, 6, 3, 10))
+    monkeypatch.setattr(_hosek, "_tables", lambda: tables)
+
+
+def test_radiance(sky_of, hosek_tables):
+    view, sun, turbidity = sky_of
+    for model in (
+        sky.preetham_radiance,
+        sky.hosek_radiance,
+        lambda v, s, t: sky.cie_radiance(v, s, t, kind=12),
+    ):
+        check_sharded(lambda *a, model=model: model(*a), (view, sun, turbidity), (ROWS,) * 3, ROWS)
+    check_sharded(lambda s, t: sky.sun_radiance(s, t), (sun, turbidity), (ROWS,) * 2, ROWS)
+    check_sharded(lambda s, t: sky.sun_harmonics(s, t, 2), (sun, turbidity), (ROWS,) * 2, ROWS)
+
+
+def test_many_views_of_one_sky(sky_of):
+    view, sun, turbidity = sky_of
+    gradient = jax.grad(lambda v, s, t: sky.preetham_radiance(v, s, t).sum())
+    specs = ROWS, WHOLE, WHOLE
+    check_sharded(gradient, (view, sun[0], turbidity[0]), specs, ROWS)
+
+
+def test_stored_fits(sky_of):
+    _, *suns = sky_of
+    window = lambda s, t: sky.preetham_harmonics(s, t, 2, window="hann")  # noqa: E731
+    gradient = jax.grad(lambda s, t: sky.preetham_harmonics(s, t, 1).sum())
+    fit = sky.preetham_table("small", 2)
+    for function in (window, gradient, lambda s, t: fit(s, t)):
+        check_sharded(function, suns, (ROWS,) * 2, ROWS)
+
+
+def test_projection(sky_of):
+    _, *suns = sky_of
+    exact = lambda s, t: sky.project_preetham(s, t, 1)  # noqa: E731
+    check_sharded(exact, suns, (ROWS,) * 2, ROWS)
+
+    def glow(view, sun, haze):
+        return jnp.exp(haze * (view @ sun))[:, None]
+
+    def slopes(sun, haze):  # of a sky that compiles faster
+        value = lambda s, h: sky.project(glow, s, h, degree=1, symmetric=True)[..., 2].sum()  # noqa: E731
+        return jax.grad(value, (0, 1))(sun, haze)
+
+    check_sharded(slopes, suns, (ROWS,) * 2, (ROWS, ROWS))
+
+
+def test_batches_of_two_axes(sky_of):
+    """Suns by turbidities: one axis is shared out, and never made one with the other."""
+    _, sun, turbidity = sky_of
+    stored = lambda s, t: sky.preetham_harmonics(s[:, None], t, 1)  # noqa: E731
+    smallest = lambda s, t: sky.smallest_luminance(s[:, None], t)  # noqa: E731
+    for function in (stored, smallest):
+        check_sharded(function, (sun, turbidity[:3]), (ROWS, WHOLE), ROWS)
+
+
+@pytest.mark.parametrize(
+    "reading", ["luminance", "channel", pytest.param("harmonics", marks=pytest.mark.slow)]
+)
+def test_smallest_luminance(sky_of, reading):
+    _, *suns = sky_of
+    smallest = lambda s, t: sky.smallest_luminance(s, t, reading=reading, degree=1)  # noqa: E731
+    check_sharded(smallest, suns, (ROWS,) * 2, ROWS)
+
+
+def test_smallest_of_a_range_that_is_shared_out(sky_of):
+    _, *suns = sky_of
+    mesh = jax.make_mesh((2,), ("rows",), axis_types=(jax.sharding.AxisType.Explicit,))
+    placed = jax.device_put(suns, jax.NamedSharding(mesh, ROWS))
+    found, expected = (sky.smallest_luminance(*at, reading="range") for at in (placed, suns))
+    assert jax.typeof(found).sharding.spec[0] == "rows"
+    np.testing.assert_allclose(found, expected, 1e-12)
+
+
+def test_ground_and_errors(rng):
+    light, exact = rng.normal(size=(2, COUNT, 3, 9))
+    low = rng.uniform(1, 2, size=(COUNT, 3))
+    check_sharded(lambda c: sky.with_ground(c, 0.3), (light,), (ROWS,), ROWS)
+    check_sharded(lambda c: sky.horizontal_irradiance(c), (light,), (ROWS,), ROWS)
+    error = lambda a, b, s: tuple(sky.fit_error(a, b, s))  # noqa: E731
+    check_sharded(error, (light, exact, low), (ROWS,) * 3, (ROWS, ROWS))
+
+
+def test_another_device_than_the_first(sky_of):
+    """Nothing that is kept is tied to the device that it was first used on."""
+    _, sun, turbidity = sky_of
+    first, second = jax.devices()[:2]
+    expected = np.asarray(sky.preetham_harmonics(sun, turbidity, 1))
+    found = sky.preetham_harmonics(*jax.device_put((sun, turbidity), second), 1)
+    assert found.devices() == {second}
+    np.testing.assert_array_equal(found, expected)
+    with jax.default_device(second):
+        assert sky.preetham_table("small", 1).coefficients.devices() == {second}
+    assert sky.preetham_table("small", 1).coefficients.devices() == {first}
