@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.sharding import AxisType, NamedSharding, PartitionSpec
 
 from jaxsh.geometry import Mesh, _embree, knot, make_mesh, neighbors, ray_scene
 from jaxsh.harmonics import clamped_cosine, convolve, evaluate, rotate
@@ -52,15 +53,17 @@ def slow_twin(mesh, degree, directions, seed, vertices):
     """Every direction of the quadrature cast from every vertex, summed as the definition says."""
     scene, quadrature = ray_scene(mesh), guided(directions, 2, seed, np.dtype(float)).vectors
     half_extent = np.ptp(np.asarray(mesh.vertices), axis=0).max() / 2
+    basis = np.asarray(evaluate(quadrature, degree))
     rows = []
     for vertex in vertices:
         normal = np.asarray(mesh.normals)[vertex]
         origin = np.asarray(mesh.vertices)[vertex] + 1e-4 * half_extent * normal
         total = np.asarray(convolve(evaluate(normal, degree), clamped_cosine(degree)), float)
-        for direction in quadrature:
+        blocked = scene.occluded(origin, quadrature)
+        for direction, y, hit in zip(quadrature, basis, blocked, strict=True):
             cosine = normal @ direction
-            if cosine > 0 and scene.occluded(origin, direction)[0]:
-                total -= 4 * np.pi / len(quadrature) * cosine * evaluate(direction, degree)
+            if cosine > 0 and hit:
+                total -= 4 * np.pi / len(quadrature) * cosine * y
         rows.append(total)
     return np.array(rows)
 
@@ -172,6 +175,18 @@ def test_normals_by_hand_that_are_none_are_counted(normal):
         coefficients = baked(receivers, shadows=False)
     exact = convolve(evaluate(jnp.array([0.0, 0, 1]), 4), clamped_cosine(4))
     np.testing.assert_allclose(coefficients, [exact, 0 * exact], atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [AxisType.Auto, AxisType.Explicit])
+def test_a_mesh_that_is_shared_out_is_baked_on_the_host(kind):
+    """The bake does not shard: it reads the whole mesh, and gives arrays on one device."""
+    devices = jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+    mesh = knot(300)
+    shared = jax.device_put(mesh, NamedSharding(devices, PartitionSpec("rows")))
+    options = {"directions": 64, "bounces": 1, "progress": False}
+    whole, got = bake(mesh, 2, **options), bake(shared, 2, **options)
+    np.testing.assert_array_equal(got.coefficients, whole.coefficients)
+    assert len(got.coefficients.devices()) == 1
 
 
 def test_a_scene_may_hold_more_than_the_mesh():
