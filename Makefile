@@ -1,45 +1,78 @@
 # Two commands on a fresh machine with Python >= 3.11:
 #   make reproduce   the main job, on the embedded default (or JAXSH_DATA=folder)
-#   make test        the tests
-# Also: make test-all (with the slow ones), make check (lint, types), make bench (beside the peers), make clean.
+#   make test        the tests, without the slow ones, and the examples of the docstrings
+# Also: make test-slow, make test-all (both), make check (lint, types), make docs (the pages, built
+# strictly), make test-oldest (the oldest JAX that is supported), make test-minimal (without the
+# packages that only some functions need), make package (wheel and sdist), make bench (beside the
+# peers), make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
 BENCH_VENV ?= .venv-bench
+OLDEST_VENV ?= .venv-oldest
 PRESET ?= quick
 bin := $(VENV)/bin
+# loadfile: what one file has traced serves its other tests.
+PARALLEL ?= -n auto --dist loadfile
 
-.PHONY: reproduce test test-all check bench clean
+.PHONY: reproduce test test-slow test-all test-oldest test-minimal check docs package bench clean
+
+# Groups of dependencies need pip >= 25.1.
+define environment
+	$(PYTHON) -m venv $(1)
+	$(1)/bin/python -m pip install --quiet --upgrade pip
+endef
 
 $(VENV)/installed: pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	$(bin)/python -m pip install --quiet --upgrade pip
-	$(bin)/python -m pip install --quiet --editable ".[check]"
+	$(call environment,$(VENV))
+	$(bin)/python -m pip install --quiet --editable . --group check
 	touch $@
 
 # Peers hold JAX back, so they get an environment of their own.
 $(BENCH_VENV)/installed: pyproject.toml
-	$(PYTHON) -m venv $(BENCH_VENV)
-	$(BENCH_VENV)/bin/python -m pip install --quiet --upgrade pip
-	$(BENCH_VENV)/bin/python -m pip install --quiet --editable ".[peers]"
+	$(call environment,$(BENCH_VENV))
+	$(BENCH_VENV)/bin/python -m pip install --quiet --editable . --group peers
+	touch $@
+
+# The floors of pyproject.toml as they stand: tools/floors.py prints them.
+$(OLDEST_VENV)/installed: pyproject.toml tools/floors.py
+	$(call environment,$(OLDEST_VENV))
+	$(PYTHON) tools/floors.py > $(OLDEST_VENV)/floors.txt
+	$(OLDEST_VENV)/bin/python -m pip install --quiet --constraint $(OLDEST_VENV)/floors.txt --editable . --group test
 	touch $@
 
 reproduce: $(VENV)/installed
 	$(bin)/python -m experiments run first_light environment --preset $(PRESET)
 
 test: $(VENV)/installed
-	$(bin)/python -m pytest -n auto --dist worksteal
+	$(bin)/python -m pytest $(PARALLEL)
+
+test-slow: $(VENV)/installed
+	$(bin)/python -m pytest $(PARALLEL) -m slow
 
 test-all: $(VENV)/installed
-	$(bin)/python -m pytest -n auto --dist worksteal -m ""
+	$(bin)/python -m pytest $(PARALLEL) -m ""
+
+test-oldest: $(OLDEST_VENV)/installed
+	$(OLDEST_VENV)/bin/python -m pytest $(PARALLEL) tests/harmonics tests/sphere tests/transfer/test_diffuse.py tests/sky/test_preetham.py
+
+test-minimal: $(VENV)/installed
+	$(bin)/python -m pytest tests/test_import.py -k without
 
 check: $(VENV)/installed
 	$(bin)/ruff check .
 	$(bin)/ruff format --check .
 	$(bin)/basedpyright --pythonpath $(bin)/python
 
+docs: $(VENV)/installed
+	$(bin)/mkdocs build --strict
+
+package: $(VENV)/installed
+	$(bin)/python -m pip install --quiet build
+	$(bin)/python -m build
+
 bench: $(BENCH_VENV)/installed
 	$(BENCH_VENV)/bin/python -m benchmarks
 
 clean:
-	rm -rf $(VENV) $(BENCH_VENV) results
+	rm -rf $(VENV) $(BENCH_VENV) $(OLDEST_VENV) .cache dist results site

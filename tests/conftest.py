@@ -1,10 +1,17 @@
 """A strict session: shapes are checked, and rank promotion, dtype promotion and warnings raise."""
 
 import os
+import pathlib
 
 # Before JAX starts: tests run in parallel processes, so each keeps to its own thread pool.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 os.environ.setdefault("MPLBACKEND", "agg")  # no window on any machine
+# Compiling is most of the time: processes, notebooks and later runs share what is compiled.
+os.environ.setdefault(
+    "JAX_COMPILATION_CACHE_DIR", str(pathlib.Path(__file__).parents[1] / ".cache" / "jax")
+)
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
 
 import hypothesis
 import jax

@@ -1,5 +1,6 @@
-"""What a newcomer would run first: the README's example and the notebooks, each from scratch."""
+"""What a newcomer would run first: the blocks of each page and the notebooks, each from scratch."""
 
+import os
 import re
 import subprocess
 import sys
@@ -7,17 +8,45 @@ from pathlib import Path
 
 import nbclient
 import nbformat
+import numpy as np
 import pytest
+from matplotlib import pyplot
 
 ROOT = Path(__file__).parent.parent
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 
-def test_readme_example(tmp_path):
-    (example,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    # A fresh process: no x64, no strict promotion, no shape checks, as at a user's.
-    subprocess.run([sys.executable, "-W", "error", "-c", example], cwd=tmp_path, check=True)
-    assert (tmp_path / "knot.png").stat().st_size > 10_000
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(page: Path) -> list[str]:
+    return re.findall(r"^```python\n(.*?)^```", page.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if blocks(page)], ids=lambda page: page.stem
+)
+def test_blocks_run_in_order(page, tmp_path):
+    """The blocks of a page share one namespace, in a fresh process: no x64, no strict promotion,
+    no shape checks, as at a user's.
+
+    Names and files that a page takes from its reader are made small by `tests/documents/PAGE.py`.
+    """
+    before = ROOT / "tests" / "documents" / f"{page.stem}.py"
+    stand_in = [before.read_text("utf-8")] if before.exists() else []
+    script = tmp_path / "blocks.py"
+    script.write_text("\n".join([*stand_in, *blocks(page)]), "utf-8")
+    subprocess.run(
+        [sys.executable, "-W", "error", script.name],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        check=True,
+    )
+    if page.stem == "README":
+        shown = pyplot.imread(tmp_path / "knot.png")[..., :3]
+        assert shown.shape[0] >= 256
+        assert 0.1 < shown.mean() < 0.9
+        assert np.ptp(shown.reshape(-1, 3), axis=0).min() > 0.5
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -1,6 +1,7 @@
 """`import jaxsh` costs little beyond `import jax`."""
 
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -65,3 +66,58 @@ def test_modules_are_listed_and_others_refused():
         assert getattr(jaxsh, module).__name__ == f"jaxsh.{module}"
     with pytest.raises(AttributeError, match=r"no attribute 'kitchen'; it has .*'harmonics'"):
         _ = jaxsh.kitchen
+
+
+# As on a machine without a wheel, or where someone left out what they do not use.
+OPTIONAL = ("OpenImageIO", "embreex", "jaxopt", "lineax", "matplotlib", "optimistix", "trimesh")
+BLOCK = """
+import sys
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {optional}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+sys.meta_path.insert(0, Absent())
+"""
+BASIS = """
+import jax.numpy as jnp
+from jaxsh import geometry, harmonics, imaging, sky, sphere, transfer
+
+assert harmonics.evaluate(jnp.eye(3), 2).shape == (3, 9)
+light = sphere.project_lat_long(imaging.studio(), degree=2)
+mesh = geometry.knot(300)
+baked = transfer.bake(mesh, degree=2, directions=32, progress=False)
+assert transfer.shade_diffuse(light, baked, 0.5).shape == (len(mesh.vertices), 3)
+assert sky.preetham_harmonics(jnp.array([0.0, 0.6, 0.8]), 3.0).shape[0] == 3
+"""
+
+
+def test_the_basis_and_a_bake_run_without_optional_packages():
+    code = BLOCK.format(optional=set(OPTIONAL)) + BASIS
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+@pytest.mark.parametrize(
+    ("package", "statement"),
+    [
+        ("OpenImageIO", "imaging.read_environment('grace.exr')"),
+        ("matplotlib", "plot.bands([1.0])"),
+        ("trimesh", "geometry.read_mesh('armadillo.off')"),
+    ],
+)
+def test_what_needs_a_package_says_so_without_it(package, statement, tmp_path):
+    (tmp_path / "grace.exr").write_bytes(b"")
+    (tmp_path / "armadillo.off").write_text("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    code = BLOCK.format(optional={package}) + (
+        f"from jaxsh import geometry, imaging, plot\n{statement}"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == 1
+    assert package in run.stderr.splitlines()[-1]
