@@ -8,10 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.shared.timing import interleaved, ratio
 from jaxsh import harmonics
 
 from . import _peers
-from ._clock import interleave, ratio
 
 # SciPy is measured where one call of it ends in a second or so, e3nn where it compiles in seconds.
 _SCIPY_COUNT, _E3NN_COUNT = 10_000, 10_000
@@ -53,7 +53,7 @@ def timings(degree: int, count: int, dtype, rounds: int) -> Iterator[dict[str, A
             name: functools.partial(jax.jit(function), vectors)
             for name, function in functions.items()
         }
-        times = interleave(calls | (scipy if quantity == "values" else {}), rounds=rounds)
+        times = interleaved(calls | (scipy if quantity == "values" else {}), rounds=rounds)
         row = {
             "quantity": quantity,
             "dtype": np.dtype(dtype).name,

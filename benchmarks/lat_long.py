@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.shared.timing import interleaved, ratio
 from jaxsh import sphere
 
 from . import _peers
-from ._clock import interleave, ratio
 
 
 def timings(degree: int, height: int, rounds: int) -> list[dict[str, Any]]:
@@ -45,7 +45,7 @@ def timings(degree: int, height: int, rounds: int) -> list[dict[str, Any]]:
         ("reconstruct", reconstruct, light),
     ]:
         calls = {n: functools.partial(jax.jit(f), argument) for n, f in functions.items()}
-        times = interleave(calls, rounds=rounds)
+        times = interleaved(calls, rounds=rounds)
         rows.append(
             {
                 "quantity": quantity,

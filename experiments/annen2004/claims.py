@@ -11,6 +11,9 @@ from jaxtyping import Array, Float
 from jaxsh import midrange, transfer
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.lights import exact_light
+from ..shared.subjects import Subject, load
+from ..shared.tables import named
 from .irradiance import (
     interpolate_records,
     irradiance,
@@ -28,13 +31,7 @@ from .methods import (
     take,
 )
 from .plots import draw_claims
-from .scenes import (
-    Subject,
-    cut,
-    exact_light,
-    load,
-    three_lights,
-)
+from .scenes import cut, three_lights
 
 NONE, FULL, TRILINEAR, HALF, INNER = (
     "k-means, no gradient",
@@ -233,7 +230,7 @@ def _tables(
         line[f"{row['distance']:g}"] = row["psnr"]
     lines = dict(sorted(lines.items(), key=lambda item: item[0][1]))
     distances = [Column(f"{d:g}", f"{d:g}", digits=1) for d in config.distances]
-    columns = [Column("samples", "samples"), Column("method", "method"), *distances]
+    columns = [*named("samples", "method"), *distances]
     yield Table(
         "PSNR by light distance and samples, dB",
         columns,
@@ -280,7 +277,7 @@ def _verdicts(config: Claims, errors: list[dict[str, Any]], box: float) -> Table
                 "holds": _held(psnrs, enough),
             }
         )
-    columns = [Column("claim", "claim"), Column("measured", "measured"), Column("holds", "holds")]
+    columns = [*named("claim", "measured"), Column("holds", "holds")]
     return Table("The paper's claims", columns, verdicts, values={"enough": enough, "box": box})
 
 

@@ -13,16 +13,11 @@ from jaxtyping import Array, Float
 from jaxsh import imaging, midrange, transfer
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.lights import exact_light
 from ..shared.plots import Panel, View, draw_panels
-from .scenes import (
-    Subject,
-    cut,
-    exact_expansion,
-    exact_light,
-    load,
-    psnr,
-    three_lights,
-)
+from ..shared.subjects import Subject, load
+from ..shared.tables import named
+from .scenes import cut, exact_expansion, psnr, three_lights
 
 _WIDTH = 0.8  # of a panel, in its heights
 _SHOWN = "one sample", "with gradient", "second order", "2³ grid, half gradient"
@@ -199,8 +194,7 @@ def _goals(rows: list[dict[str, Any]]) -> Table:
         ):
             lines.append({"mesh": mesh, "goal": goal, "least": least, "measured": measured})
     columns = [
-        Column("mesh", "mesh"),
-        Column("goal", "goal"),
+        *named("mesh", "goal"),
         Column("least", "at least, dB", digits=1),
         Column("measured", "measured, dB", digits=1),
     ]

@@ -11,8 +11,10 @@ from jaxtyping import Array, Float
 from jaxsh import geometry, imaging, midrange, transfer
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.lights import exact_light, rectangle
 from ..shared.plots import GROUND, Panel, View, draw_panels
-from .scenes import Subject, cut, exact_light, load, psnr, rectangle
+from ..shared.subjects import Subject, load
+from .scenes import cut, psnr
 
 _COLOR = (1.0, 0.93, 0.8)
 _TOWARD = (0.0, -1.0, -0.12)  # to the camera: a little from below, where the light is seen

@@ -11,8 +11,9 @@ from scipy.spatial import KDTree
 from jaxsh import imaging, midrange, sphere
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.lights import exact_light
 from ..shared.plots import GROUND, Panel, draw_panels
-from .scenes import cut, exact_light, three_lights
+from .scenes import cut, three_lights
 
 _ORDERS = "sample", "with gradient", "second order"
 

@@ -13,10 +13,12 @@ from jaxsh import imaging, midrange
 
 from ..runner import Column, Context, Table, experiment
 from ..shared.plots import Panel, View, draw_panels
+from ..shared.subjects import Subject, load
+from ..shared.tables import named
 from .dots import glass
 from .methods import Trial, box_grid, take
 from .overlap import overlapping, overlapping_light
-from .scenes import Subject, cut, load
+from .scenes import cut
 
 _SAMPLES = 8
 _WIDTH = 0.9  # of a panel, in its heights
@@ -204,5 +206,5 @@ def _verdicts(config: Figure7, rows: list[dict[str, Any]]) -> Table:
         {"claim": claim, "measured": measured, "holds": "yes" if holds else "no"}
         for claim, measured, holds in lines
     ]
-    columns = [Column("claim", "claim"), Column("measured", "measured"), Column("holds", "holds")]
+    columns = [*named("claim", "measured"), Column("holds", "holds")]
     return Table("What the paper says of it", columns, verdicts)

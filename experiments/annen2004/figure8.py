@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from jaxsh import midrange, sphere
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.tables import named
 from .overlap import filled_light, overlapping, overlapping_light
 from .plots import draw_distances
 from .scenes import cut
@@ -93,7 +94,7 @@ def _tables(config: Figure8, rows: list[dict[str, Any]]) -> Iterator[Table]:
         line[f"{row['distance']:g}"] = row["error"]
     shown = [Column(f"{distance:g}", f"at {distance:g}", digits=2) for distance in _SHOWN]
     title = "Error of extrapolated radiance by distance, %"
-    columns = [Column("method", "method"), Column("scene", "scene"), *shown]
+    columns = [*named("method", "scene"), *shown]
     yield Table(title, columns, list(lines.values()))
     ratios = []
     for method in (*_ORDERS, _EDGES):

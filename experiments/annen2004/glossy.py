@@ -12,9 +12,11 @@ from jaxtyping import Array, Float
 from jaxsh import imaging, midrange, transfer
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.lights import exact_light
 from ..shared.plots import Panel, View, draw_panels
+from ..shared.subjects import Subject, load
 from .methods import box_grid, expand, take
-from .scenes import Subject, cut, exact_expansion, exact_light, load, three_lights
+from .scenes import cut, exact_expansion, three_lights
 
 _WIDTH = 0.8  # of a panel, in its heights
 _ORDERS = "one sample", "with gradient", "second order"

@@ -12,7 +12,8 @@ from jaxtyping import Array, ArrayLike, Float
 
 from jaxsh import imaging, midrange, transfer
 
-from .scenes import Subject, exact_expansion, psnr
+from ..shared.subjects import Subject
+from .scenes import exact_expansion, psnr
 
 Rule = Literal["none", "half", "full"]
 

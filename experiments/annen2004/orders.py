@@ -10,11 +10,14 @@ from jaxtyping import Array, Float
 
 from jaxsh import midrange, transfer
 
-from ..habel2008.cost import interleaved
 from ..runner import Column, Context, Table, experiment
+from ..shared.lights import exact_light
+from ..shared.subjects import Subject, load
+from ..shared.tables import named
+from ..shared.timing import fastest
 from .methods import Trial, expand, inner_grid, take
 from .plots import draw_orders
-from .scenes import Subject, cut, exact_light, load, three_lights
+from .scenes import cut, three_lights
 
 _TARGETS = 25, 30, 35, 40, 45, 50, 55, 60
 _STAGES = "capture", "project", "shade"
@@ -130,7 +133,7 @@ def _seconds(
             calls[f"shade {count} {order}"] = functools.partial(
                 trial.shade, expansion, layout.weights, layout.rule
             )
-    return interleaved(calls, config.rounds), cubes
+    return fastest(calls, rounds=config.rounds), cubes
 
 
 def on_front(row: dict[str, Any], rows: Sequence[dict[str, Any]], key: str) -> bool:
@@ -148,8 +151,7 @@ def _tables(
 ) -> Iterator[Table]:
     shown = [row | {"front": "yes" if row["front exact"] else ""} for row in rows]
     columns = [
-        Column("samples", "samples"),
-        Column("order", "order"),
+        *named("samples", "order"),
         *(Column(stage, f"{stage}, ms", digits=2) for stage in _STAGES),
         Column("total", "total, ms", digits=2),
         Column("exact", "PSNR, exact terms, dB", digits=1),
@@ -175,8 +177,7 @@ def _cheapest(rows: Sequence[dict[str, Any]], vertices: int, exact: float) -> Ta
             lines.append({"target": target} | best)
     columns = [
         Column("target", "at least, dB"),
-        Column("samples", "samples"),
-        Column("order", "order"),
+        *named("samples", "order"),
         Column("total", "total, ms", digits=2),
         Column("exact", "PSNR, exact terms, dB", digits=1),
     ]

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from jaxsh import midrange
 
-from .scenes import exact_light, rectangle
+from ..shared.lights import exact_light, rectangle
 
 # The figure's blue light has no red in it: in the red channel it is a blocker and nothing else.
 _RED, _BLUE = (1.0, 0.12, 0.08), (0.0, 0.16, 1.0)

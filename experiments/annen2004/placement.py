@@ -12,18 +12,14 @@ from jaxtyping import Array, Float
 from jaxsh import harmonics, imaging, midrange
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.lights import exact_light, rectangle
 from ..shared.plots import Panel, View, draw_panels
+from ..shared.subjects import Subject, load
+from ..shared.tables import named
 from .dots import glass
 from .methods import EXPONENTS, Trial, exact_samples, inner_grid
 from .plots import draw_frames, draw_placement
-from .scenes import (
-    RED,
-    Subject,
-    exact_light,
-    load,
-    rectangle,
-    three_lights,
-)
+from .scenes import RED, three_lights
 
 _GRID = "inner grid, half gradient"
 _PATH = (-3.0, 3.0)  # of the moving light along x, in the object's radius
@@ -228,8 +224,7 @@ def _tables(
             line[f"error {row['method']}"] = row["error"]
     methods = dict.fromkeys(row["method"] for row in placed)
     columns = [
-        Column("scene", "scene"),
-        Column("samples", "samples"),
+        *named("scene", "samples"),
         *(Column(method, f"{method}, dB", digits=1) for method in methods),
         *(
             Column(f"error {method}", f"{method}: error, %", digits=2)
@@ -248,10 +243,7 @@ def _tables(
         },
     )
     columns = [
-        Column("frame", "frame"),
-        Column("samples", "samples"),
-        Column("added", "added"),
-        Column("removed", "removed"),
+        *named("frame", "samples", "added", "removed"),
         Column("predicted", "error predicted, %", digits=2),
         Column("error", "at all vertices, %", digits=2),
         Column("one", "of one sample, %", digits=2),

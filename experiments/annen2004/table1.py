@@ -2,7 +2,6 @@
 
 import dataclasses
 import statistics
-import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, TypeVar
 
@@ -12,7 +11,11 @@ import numpy as np
 from jaxsh import geometry, imaging, midrange, transfer
 
 from ..runner import Column, Context, Table, experiment
-from .scenes import Subject, exact_light, load, three_lights
+from ..shared.lights import exact_light
+from ..shared.subjects import Subject, load
+from ..shared.tables import named
+from ..shared.timing import timed
+from .scenes import three_lights
 
 _SIZE = 512  # of the picture, as in §7
 _TURN = 0.05  # of the lights about the vertical from frame to frame, in radians
@@ -74,23 +77,21 @@ class Frame(NamedTuple):
         config, subject = self.config, self.subject
         seconds: dict[str, float] = {}
 
-        def timed(stage: str, function: Callable[..., T], *arguments: Any) -> T:
-            start = time.perf_counter()
-            result = jax.block_until_ready(function(*arguments))
-            seconds[stage] = time.perf_counter() - start
+        def staged(stage: str, function: Callable[..., T], *arguments: Any) -> T:
+            result, seconds[stage] = timed(function, *arguments)
             return result
 
         if way == _EXACT:
             at = subject.baked.positions
-            light = timed("project", exact_light, lights, at, config.degree)
-            shaded = timed("shade", transfer.shade_diffuse, light, subject.baked, config.albedo)
+            light = staged("project", exact_light, lights, at, config.degree)
+            shaded = staged("shade", transfer.shade_diffuse, light, subject.baked, config.albedo)
         else:
-            cube = timed("trace", self._capture, lights)
+            cube = staged("trace", self._capture, lights)
             order = _WAYS.index(way)
-            expansion = timed("project", midrange.taylor, cube, config.degree, order)
-            shaded = timed("shade", midrange.shade, expansion, subject.baked, config.albedo)
-        raster = timed("raster", self._raster)
-        timed("draw", _develop, raster, shaded, self.exposure)
+            expansion = staged("project", midrange.taylor, cube, config.degree, order)
+            shaded = staged("shade", midrange.shade, expansion, subject.baked, config.albedo)
+        raster = staged("raster", self._raster)
+        staged("draw", _develop, raster, shaded, self.exposure)
         return seconds
 
     def _raster(self) -> imaging.Raster:
@@ -204,7 +205,7 @@ def _tables(
     )
     yield Table(
         "Goals",
-        [Column("goal", "goal"), Column("limit", "limit"), Column("measured", "measured")],
+        [*named("goal", "limit"), Column("measured", "measured")],
         _goals(models[0], stages[:2]),
         values={"mesh": models[0]["mesh"]},
     )

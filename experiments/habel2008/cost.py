@@ -7,8 +7,7 @@ has no dispatch to pay for.
 import dataclasses
 import functools
 import math
-import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from importlib.resources import as_file, files
 from typing import Any, NamedTuple
 
@@ -20,13 +19,13 @@ from jaxtyping import Array, Float
 from jaxsh import harmonics, sky, sphere
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.timing import fastest, timed
 from .numpy_twin import polynomial, projection
 from .suns import PLAIN, TURBIDITY, ZENITH, Suns, polynomials, project
 
 SAMPLES = 4096
 _DEGREE = 6
 _PAPER_MICROSECONDS = 80.0  # "maximum computation time for 7 bands", on a Pentium 4 of 3.2 GHz
-_SLICE = 2e-3  # seconds: calls are repeated up to this length, so that the clock can tell
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,8 +83,8 @@ def cost(config: Cost, context: Context) -> list[Table]:
     ways = _ways(config, context, batch)
     for way in ways.values():
         way.many()  # warm
-    singles = interleaved({name: way.one for name, way in ways.items()}, config.rounds)
-    batches = interleaved({name: way.many for name, way in ways.items()}, config.rounds)
+    singles = fastest({name: way.one for name, way in ways.items()}, rounds=config.rounds)
+    batches = fastest({name: way.many for name, way in ways.items()}, rounds=config.rounds)
     judged = batch.first(min(config.suns, config.sampled, 256))
     exact, low = _exact(judged)
     for name, way in ways.items():
@@ -102,26 +101,6 @@ def cost(config: Cost, context: Context) -> list[Table]:
         }
         context.record(row | ({"one_us_paper": _PAPER_MICROSECONDS} if "eq. 1" in name else {}))
     return [_memory(context), *_times(config, context.rows)]
-
-
-def interleaved(calls: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
-    """Seconds per call, the fastest round of each: other work on the machine can only add."""
-    repeats = {}
-    for name, call in calls.items():
-        jax.block_until_ready(call())
-        repeats[name] = max(1, int(_SLICE / _seconds(call, 1)))
-    best = dict.fromkeys(calls, float("inf"))
-    for _ in range(rounds):
-        for name, call in calls.items():
-            best[name] = min(best[name], _seconds(call, repeats[name]))
-    return best
-
-
-def _seconds(call: Callable[[], Any], repeats: int) -> float:
-    start = time.perf_counter()
-    for _ in range(repeats):
-        jax.block_until_ready(call())
-    return (time.perf_counter() - start) / repeats
 
 
 def _ways(config: Cost, context: Context, batch: Batch) -> dict[str, Way]:
@@ -168,9 +147,8 @@ def _jitted(
 
     def bind(name: str, arrays) -> Callable[[], Array]:
         arguments = [jnp.asarray(a) for a in arrays]
-        start = time.perf_counter()
-        compiled = jax.jit(function).lower(*arguments).compile()
-        context.times[f"{label}: {name}"] = {"compile_seconds": time.perf_counter() - start}
+        compiled, seconds = timed(lambda: jax.jit(function).lower(*arguments).compile())
+        context.times[f"{label}: {name}"] = {"compile_seconds": seconds}
         return functools.partial(compiled, *arguments)
 
     return bind("one sun", one), bind("a batch", many)

@@ -2,11 +2,9 @@
 
 import dataclasses
 import functools
-import time
 import warnings
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -15,6 +13,7 @@ from jaxsh import geometry, imaging, sky, transfer
 
 from ..runner import Column, Context, Table, experiment
 from ..shared.plots import Panel, animate, draw_panels
+from ..shared.timing import timed
 from .spheres import LUMINANCE
 
 _MESH_ALBEDO, _GROUND_ALBEDO = (0.62, 0.58, 0.52), (0.30, 0.29, 0.26)
@@ -85,8 +84,7 @@ def figure1_5(config: Figure15, context: Context) -> Table:
     frames = []
     for hour in context.progress(hours, "frames"):
         sun = sun_at_hour(hour, config.latitude, config.declination)
-        start = time.perf_counter()
-        image, seconds, lit = _render(config, scene, sun)
+        (image, seconds, lit), whole = timed(_render, config, scene, sun)
         context.record(
             {
                 "hour": 12 + hour,
@@ -95,7 +93,7 @@ def figure1_5(config: Figure15, context: Context) -> Table:
                 "sun": _level(_sun_irradiance(config, sun) * sun[2]),
                 "sunlit": 100 * lit,
                 "shade_ms": 1e3 * seconds,
-                "frame_ms": 1e3 * (time.perf_counter() - start),
+                "frame_ms": 1e3 * whole,
             }
         )
         frames.append(Frame(hour, sun, image))
@@ -230,10 +228,11 @@ def _level(irradiance) -> float:
 
 def _render(config: Figure15, scene: Scene, sun) -> tuple[Float[Array, "h w 3"], float, float]:
     """The picture, the seconds that the sky's shading took, and the share of samples in the sun."""
-    start = time.perf_counter()
-    light = _sky(config, sun, "habel")
-    shaded = jax.block_until_ready(transfer.shade_diffuse(light, scene.baked, scene.albedo))
-    seconds = time.perf_counter() - start
+
+    def shade():
+        return transfer.shade_diffuse(_sky(config, sun, "habel"), scene.baked, scene.albedo)
+
+    shaded, seconds = timed(shade)
     facing = np.maximum(scene.normals @ sun, 0)
     open_ = (facing > 0) & (np.asarray(scene.raster.face).ravel() >= 0)
     lit = np.zeros(len(facing), np.float32)

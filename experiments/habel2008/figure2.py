@@ -12,6 +12,7 @@ from jaxsh import harmonics, sky, sphere
 
 from ..runner import Column, Context, Table, experiment
 from ..shared.plots import plt, save
+from ..shared.tables import named
 from .spheres import (
     LUMINANCE,
     mean_luminance,
@@ -95,8 +96,7 @@ def figure2(config: Figure2, context: Context) -> Table:
     return Table(
         "The fit at its worst",
         [
-            Column("model", "model"),
-            Column("bands", "bands"),
+            *named("model", "bands"),
             Column("zenith", "sun from the zenith, degrees", digits=1),
             Column("turbidity", "turbidity", digits=2),
             Column("error", "E_mean there, %", digits=4),

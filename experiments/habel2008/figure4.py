@@ -1,7 +1,7 @@
 """Ringing from the horizon, and what windows do about it and cost."""
 
 import dataclasses
-from typing import Any, Literal
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from jaxsh import harmonics, sky, sphere
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.lights import windowed
 from ..shared.plots import plt, save
 from .spheres import (
     LUMINANCE,
@@ -22,11 +23,6 @@ from .spheres import (
 )
 
 _WINDOWS = ("none", "zonal sinc (eq. 5)", "sinc", "Hann", "dering")
-_KINDS: dict[str, Literal["zonal-sinc", "lanczos", "hann"]] = {
-    "zonal sinc (eq. 5)": "zonal-sinc",
-    "sinc": "lanczos",
-    "Hann": "hann",
-}
 _BELOW = np.sin(np.radians(20))
 
 
@@ -67,17 +63,6 @@ def figure4(config: Figure4, context: Context) -> list[Table]:
             )
             _draw(context.path("figure4.png", caption), sun, config.turbidity, lights)
     return _tables(config, context.rows)
-
-
-def windowed(light: Float[Array, "3 k"], name: str) -> Float[Array, "3 k"]:
-    """Under a window; `dering` takes the least strength that suits every channel."""
-    degree = harmonics.degree_of(light.shape[-1])
-    if name == "none":
-        return light
-    if name == "dering":
-        strength = jnp.max(harmonics.dering(light)[1])
-        return light * harmonics.damping(strength, degree)[None]
-    return light * harmonics.window(_KINDS[name], degree)[None]
 
 
 def measures(filtered: Float[Array, "3 k"], light: Float[Array, "3 k"]) -> dict[str, float]:

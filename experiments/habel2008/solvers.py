@@ -20,6 +20,7 @@ from jaxtyping import Array, Float
 from jaxsh import harmonics, sky
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.tables import named
 from .suns import PLAIN, TURBIDITY, ZENITH, Columns, Suns, polynomials, project, scaled
 
 _TOLERANCE = float(np.finfo(np.float64).eps) ** 0.5  # what the package's own solvers take
@@ -215,9 +216,7 @@ _SOLVERS: dict[str, Solve] = {
 
 def _tables(config: Solvers, problem: Problem, rows: list[dict[str, Any]]) -> Iterator[Table]:
     columns = [
-        Column("basis", "basis"),
-        Column("solver", "solver"),
-        Column("steps", "steps"),
+        *named("basis", "solver", "steps"),
         Column("result", "what it says"),
         Column("residual", "residual / the least"),
         Column("error", "E_mean in float64, %"),

@@ -1,7 +1,6 @@
 """Colours of lights whose shapes are known, one of which is off."""
 
 import dataclasses
-import time
 from typing import Any, NamedTuple
 
 import jax
@@ -13,7 +12,9 @@ from scipy.optimize import lsq_linear, nnls
 from jaxsh import inverse, midrange, transfer
 
 from ..runner import Column, Context, Table, experiment
-from .lights import bake, lamp, shade, some, with_noise
+from ..shared.subjects import double, load
+from ..shared.timing import timed
+from .lights import lamp, shade, some, with_noise
 
 _TOWARDS = (
     (-0.8, -0.5, 0.35),
@@ -63,7 +64,8 @@ class Problem(NamedTuple):
 @experiment("inverse.colors", x64=True)
 def colors(config: Colors, context: Context) -> Table:
     """Bounded least squares through JAXopt, beside SciPy's and least squares without bounds."""
-    name, mesh, baked = bake(context, config.mesh, config.degree, config.directions)
+    loaded = load(context, config.mesh, config.degree, directions=config.directions)
+    name, mesh, baked = double(loaded)
     problem = _problem(config, some(baked, config.vertices, context.seed))
     clean = jnp.asarray(problem.matrix @ problem.truth)
     for level in config.noise:
@@ -108,12 +110,7 @@ def _answers(
         "SciPy nnls": lambda: np.stack([nnls(matrix, b)[0] for b in numbers.T], -1),
         "no bounds": lambda: np.linalg.lstsq(matrix, numbers)[0],
     }
-    answers = {}
-    for name, method in methods.items():
-        start = time.perf_counter()
-        value = method()
-        answers[name] = value, time.perf_counter() - start
-    return answers
+    return {name: timed(method) for name, method in methods.items()}
 
 
 def _row(method, level, repeat, value, truth, reference, seconds: float) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import time
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -14,8 +13,10 @@ from jaxtyping import Array, Float
 from jaxsh import inverse, midrange, transfer
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.subjects import double, load
+from ..shared.timing import timed
 from .emitters_picture import Scene, draw
-from .lights import bake, lamp, shade, some, with_noise
+from .lights import lamp, shade, some, with_noise
 
 Lights = tuple[inverse.Rectangle, ...]
 
@@ -65,7 +66,8 @@ class Errors(NamedTuple):
 @experiment("inverse.emitters", x64=True)
 def emitters(config: Emitters, context: Context) -> Table:
     """Recovered from shading alone, beside the truth."""
-    name, mesh, baked = bake(context, config.mesh, config.degree, config.directions)
+    loaded = load(context, config.mesh, config.degree, directions=config.directions)
+    name, mesh, baked = double(loaded)
     seen = some(baked, config.vertices, context.seed)
     rng = np.random.default_rng(context.seed)
     shown: Scene | None = None
@@ -77,18 +79,7 @@ def emitters(config: Emitters, context: Context) -> Table:
             for level in config.noise:
                 key = jax.random.fold_in(jax.random.fold_in(context.key, 97 * count + number), 1)
                 observed = with_noise(clean, level, key)
-                start = time.perf_counter()
-                starts = _starts(observed, seen, config, guesses)
-                found = inverse.fit_polygons(
-                    observed,
-                    seen,
-                    config.albedo,
-                    starts,
-                    max_steps=config.max_steps,
-                    throw=False,
-                )
-                jax.block_until_ready(found.statistics.residual)
-                seconds = time.perf_counter() - start
+                (starts, found), seconds = timed(_fit, observed, seen, config, guesses)
                 order = _match(found.value, truth)
                 context.record(_row(count, number, level, truth, found, order, seconds))
                 if number == 0:
@@ -153,6 +144,13 @@ def _starts(
         rated.append((float(found.statistics.residual), polygons))
     rated.sort(key=lambda pair: pair[0])
     return [polygons for _, polygons in rated[: config.starts]]
+
+
+def _fit(observed, seen: transfer.Transfer, config: Emitters, guesses: Sequence[Lights]):
+    """The starts, and what is recovered from them."""
+    starts = _starts(observed, seen, config, guesses)
+    options = {"max_steps": config.max_steps, "throw": False}
+    return starts, inverse.fit_polygons(observed, seen, config.albedo, starts, **options)
 
 
 def _match(found: Lights, truth: Lights) -> tuple[int, ...]:

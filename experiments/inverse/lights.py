@@ -7,33 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxsh import geometry, inverse, midrange, transfer
+from jaxsh import inverse, midrange, transfer
 
-from ..annen2004.scenes import exact_light, rectangle
-from ..runner import Context
-
-
-def bake(
-    context: Context, name: str | None, degree: int, directions: int
-) -> tuple[str, geometry.Mesh, transfer.Transfer]:
-    """A mesh of the data, the first where none is named, and its transfer in float64.
-
-    So that what is seen without noise is the method and not rounding.
-    """
-    name = name or context.data.meshes()[0]
-    mesh = context.data.mesh(name)
-    with context.time("bake"):
-        baked = transfer.bake(
-            mesh, degree, directions=directions, seed=context.seed, progress=False
-        )
-        jax.block_until_ready(baked.coefficients)
-    double = transfer.Transfer(
-        baked.coefficients.astype(jnp.float64),
-        baked.positions.astype(jnp.float64),
-        baked.normals,
-        baked.neighbors,
-    )
-    return name, mesh, double
+from ..shared.lights import exact_light, rectangle
 
 
 def some(baked: transfer.Transfer, count: int, seed: int) -> transfer.Transfer:

@@ -6,7 +6,6 @@ and `inverse.fit_sky`, which knows only the shipped fit of the sky, has to say w
 
 import dataclasses
 import functools
-import time
 from typing import Any, NamedTuple
 
 import jax
@@ -17,6 +16,8 @@ from jaxtyping import Array, Float
 from jaxsh import inverse, sky, transfer
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.subjects import double, load
+from ..shared.timing import timed
 from .pictures import Case, draw_errors, draw_sky
 
 
@@ -55,12 +56,8 @@ class Truth(NamedTuple):
 
 @experiment("inverse.sky", x64=True)
 def run(config: InverseSky, context: Context) -> Table:
-    name = config.mesh or context.data.meshes()[0]
-    mesh = context.data.mesh(name)
-    with context.time("bake"):
-        baked = _double(
-            transfer.bake(mesh, config.degree, directions=config.directions, progress=False)
-        )
+    loaded = load(context, config.mesh, config.degree, directions=config.directions)
+    name, mesh, baked = double(loaded)
     truths = _truths(config, context, baked)
     fit = jax.jit(
         functools.partial(inverse.fit_sky, exposure=None if config.exposure else 1.0, throw=False)
@@ -71,9 +68,7 @@ def run(config: InverseSky, context: Context) -> Table:
             key = jax.random.fold_in(jax.random.fold_in(context.key, number), int(1e6 * level))
             error = jax.random.normal(key, truth.observed.shape, truth.observed.dtype)
             observed = truth.observed + level * truth.observed.mean() * error
-            start = time.perf_counter()
-            found = jax.block_until_ready(fit(observed, baked, config.albedo))
-            seconds = time.perf_counter() - start
+            found, seconds = timed(fit, observed, baked, config.albedo)
             context.record(_row(number, level, truth, found, seconds))
             if number == 0:
                 cases.append(Case(level, observed, found))
@@ -95,13 +90,6 @@ def _truths(config: InverseSky, context: Context, baked: transfer.Transfer) -> l
         light = sky.project_preetham(jnp.asarray(sun), turbidity, config.degree)
         truths.append(Truth(sun, turbidity, transfer.shade_diffuse(light, baked, config.albedo)))
     return truths
-
-
-def _double(baked: transfer.Transfer) -> transfer.Transfer:
-    """In float64, so that what is seen without noise is the method and not rounding."""
-    return transfer.Transfer(
-        baked.coefficients.astype(jnp.float64), baked.positions, baked.normals, baked.neighbors
-    )
 
 
 def _row(number: int, level: float, truth: Truth, found, seconds: float) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.tables import GAINS, PSNR, RIVAL, named
 from .methods import (
     METHODS,
     Method,
@@ -20,35 +21,26 @@ from .methods import (
     warm,
 )
 from .plots import draw_exponents
-from .scenes import Row, Scene, Scenes, rows_or_default
+from .scenes import One, Row, Scene
 
 
 @dataclasses.dataclass(frozen=True)
-class Exponent:
-    environment: str | None = None
-    """none means the first of the data"""
-    mesh: str | None = None
-    """none means the first of the data"""
+class Exponent(One):
     degree: int = 4
     methods: tuple[Method, ...] = METHODS
     exponents: tuple[float, ...] = (8.0, 32.0, 1000.0)
-    frames: int = 3
-    """frames of each, in turns"""
-    directions: int = 2048
-    """directions of the bake"""
 
     def __post_init__(self):
-        if self.degree < 3 or min(self.frames, self.directions) < 1:
-            raise ValueError("degree must be at least 3, frames and directions at least 1")
+        super().__post_init__()
+        if self.degree < 3:
+            raise ValueError(f"degree must be at least 3, got {self.degree}")
         if not self.exponents or min(self.exponents) <= 0 or not self.methods:
             raise ValueError("methods must be one or more, and exponents too, above 0")
 
 
 @experiment("leekim2014.exponent")
 def exponent(config: Exponent, context: Context) -> list[Table]:
-    [first] = rows_or_default(context, (), config.degree)
-    row = Row(config.environment or first.environment, config.mesh or first.mesh, config.degree)
-    scenes = Scenes(context, [row], config.directions)
+    row, scenes = config.open(context, config.degree)
     for value in context.progress(config.exponents, "exponents"):
         for line in _rows(config, context, scenes.load(row, exponent=value), value):
             context.record(line)
@@ -84,17 +76,12 @@ def _rows(
 
 def _tables(config: Exponent, rows: list[dict[str, Any]], row: Row) -> Iterator[Table]:
     columns = [
-        Column("exponent", "exponent"),
-        Column("method", "method"),
-        Column("psnr_image", "PSNR, dB: image", digits=1),
-        Column("psnr_object", "object", digits=1),
-        Column("psnr_vertex", "vertices", digits=1),
+        *named("exponent", "method"),
+        *PSNR,
         Column("gain", "gain against full", digits=2),
-        Column("gain_product", "against product form", digits=2),
-        Column("gain_einsum", "against einsum", digits=2),
+        *GAINS,
         Column("kept", "share kept", digits=3),
-        Column("rival", "truncation at its cost"),
-        Column("rival_psnr_object", "its object PSNR", digits=1),
+        *RIVAL,
     ]
     if not any("kept" in line for line in rows):
         columns = [column for column in columns if column.key != "kept"]

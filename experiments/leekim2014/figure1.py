@@ -11,6 +11,7 @@ from jaxsh import harmonics, transfer
 
 from ..runner import Column, Context, Table, experiment
 from ..shared.plots import Panel, draw_panels
+from ..shared.tables import named
 from .methods import adaptive_way
 from .pictures import Canvas, Look, evened
 from .scenes import Scene, Scenes, rows_or_default
@@ -96,9 +97,7 @@ def measured(scene: Scene, shading: Shading, full: Float[Array, "v 3"]) -> dict[
 def columns() -> list[Column]:
     return [
         Column("environment", "probe"),
-        Column("mesh", "mesh"),
-        Column("degree", "degree"),
-        Column("method", "method"),
+        *named("mesh", "degree", "method"),
         Column("kept", "specular at the last degree, share of vertices", digits=2),
         Column("spent", "multiply-adds, share of full", digits=2),
         Column("psnr_image", "PSNR of the picture, dB", paper="psnr_paper", digits=2),

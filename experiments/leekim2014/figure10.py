@@ -8,8 +8,8 @@ from typing import Literal
 import jax
 import numpy as np
 
-from ..habel2008.figure4 import windowed
 from ..runner import Column, Context, Table, experiment
+from ..shared.lights import windowed
 from ..shared.plots import Panel, animate, draw_panels, plt, save
 from .figure1 import BASE
 from .pictures import Canvas, Look, evened

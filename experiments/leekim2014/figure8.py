@@ -12,6 +12,7 @@ from jaxsh import adaptive, harmonics, transfer
 
 from ..runner import Column, Context, Table, experiment
 from ..shared.plots import Panel, draw_panels
+from ..shared.tables import named
 from .pictures import Canvas, Look, evened
 from .scenes import ALBEDO, Scene, Scenes, rows_or_default
 
@@ -132,8 +133,7 @@ def _regions(levels: list[Level], threshold: float) -> dict[int, Array]:
 def _table(config: Figure8, rows: list[dict[str, Any]]) -> Table:
     columns = [
         Column("environment", "probe"),
-        Column("mesh", "mesh"),
-        Column("level", "level"),
+        *named("mesh", "level"),
         Column("rms", "RMS change since the base", digits=4),
         Column("left", "RMS that higher levels add", digits=4),
         Column("darker", "share of vertices that darken", digits=2),

@@ -4,8 +4,7 @@ import functools
 import itertools
 import math
 import statistics
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Literal, get_args
 
 import jax
@@ -17,6 +16,7 @@ from jaxsh import adaptive, transfer
 from jaxsh.harmonics import convolve, evaluate, phong, product_matrix
 
 from ..runner import Context
+from ..shared.timing import bursts
 from .scenes import Quality, Scene
 
 Method = Literal["masks", "levels", "two_stage", "probes", "tiles"]
@@ -105,21 +105,8 @@ def warm(context: Context, label: str, ways: Mapping[str, Way], light: Light) ->
 
 def seconds(ways: Mapping[str, Way], lights: Iterable[Light]) -> dict[str, float]:
     """The median frame of each way; they take turns of a few frames, as an animation has them."""
-    taken: dict[str, list[float]] = {name: [] for name in ways}
-    for burst in _bursts(lights):
-        jax.block_until_ready(burst)
-        for name, way in ways.items():
-            for light in burst:
-                start = time.perf_counter()
-                jax.block_until_ready(way(light))
-                taken[name].append(time.perf_counter() - start)
-    return {name: statistics.median(times) for name, times in taken.items()}
-
-
-def _bursts(lights: Iterable[Light]) -> Iterator[list[Light]]:
-    lights = iter(lights)
-    while burst := list(itertools.islice(lights, _BURST)):
-        yield burst
+    taken = bursts(ways, ((light,) for light in lights), length=_BURST)
+    return {name: statistics.median(itertools.chain(*turns)) for name, turns in taken.items()}
 
 
 def lights(scene: Scene, frames: int) -> list[Light]:

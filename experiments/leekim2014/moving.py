@@ -1,7 +1,7 @@
 """Light and eye both move: tiles that follow the eye, against the full computation."""
 
+import functools
 import statistics
-import time
 from typing import Any
 
 import jax
@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from jaxsh import adaptive, transfer
 
 from ..runner import Context
+from ..shared.timing import timed
 from .methods import lights
 from .scenes import Scene, towards, vertex_psnr
 
@@ -21,14 +22,13 @@ def moving(context: Context, scene: Scene, frames: int, views: int, step: float)
     path = eyes(scene, frames + 1, step)
     low, high = jnp.min(scene.baked.positions, axis=0), jnp.max(scene.baked.positions, axis=0)
     distance = float(jnp.linalg.norm(path[0] - (low + high) / 2))
-    start = time.perf_counter()
     exponent = float(scene.material.exponent)
-    atlas = adaptive.make_tile_atlas(scene.baked, distance=distance, views=views, exponent=exponent)
-    made = time.perf_counter() - start
-    start = time.perf_counter()
+    make = functools.partial(
+        adaptive.make_tile_atlas, distance=distance, views=views, exponent=exponent
+    )
+    atlas, made = timed(make, scene.baked)
     prepared = adaptive.TileFollower(atlas, scene.baked, path[0])
-    sets = prepared.prepare(jnp.stack(path))
-    prepared_in = time.perf_counter() - start
+    sets, prepared_in = timed(prepared.prepare, jnp.stack(path))
     sampled, quantized = transfer.sample(scene.baked), transfer.quantize(scene.baked)
 
     def full(light, eye):
@@ -52,10 +52,10 @@ def moving(context: Context, scene: Scene, frames: int, views: int, step: float)
     turning = [scene.light, *lights(scene, frames)]
     for name, way in ways.items():
         for frame, (light, eye) in enumerate(zip(turning, path, strict=True)):
-            start = time.perf_counter()
-            colors[name].append(jax.block_until_ready(way(light, eye)))
+            shaded, seconds = timed(way, light, eye)
+            colors[name].append(shaded)
             if frame:  # the first one compiles
-                taken[name].append(time.perf_counter() - start)
+                taken[name].append(seconds)
     errors = [
         float(vertex_psnr(ours, theirs, towards(eye, scene.baked)))
         for ours, theirs, eye in zip(colors["prepared"], colors["full"], path, strict=True)

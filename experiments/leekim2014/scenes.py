@@ -4,10 +4,10 @@ A scene is a mesh under a light probe at a degree. Its light is scaled so that c
 thresholds and errors are of linear colour with white at 1.
 """
 
+import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -15,6 +15,7 @@ from jaxtyping import Array, Bool, Float
 from jaxsh import geometry, harmonics, imaging, sphere, transfer
 
 from ..runner import Context
+from ..shared.subjects import load
 
 SIZE = 512  # of the picture, in pixels
 ALBEDO = 0.5  # diffuse and specular
@@ -112,7 +113,7 @@ class Scene(NamedTuple):
         """The same at a lower degree: leading coefficients, exposure unchanged."""
         light = self.light[:, : harmonics.num_coefficients(degree)]
         return self._replace(
-            row=self.row._replace(degree=degree), baked=cut(self.baked, degree), light=light
+            row=self.row._replace(degree=degree), baked=self.baked.truncated(degree), light=light
         )
 
     def picture(self, color: Float[Array, "v 3"]) -> Float[Array, "h w 3"]:
@@ -145,7 +146,7 @@ class Scenes:
         if row.mesh not in self._baked:
             self._bake(row.mesh)
         mesh, camera, raster = self._meshes[row.mesh]
-        baked = cut(self._baked[row.mesh], row.degree)
+        baked = self._baked[row.mesh].truncated(row.degree)
         light = sphere.project_lat_long(self._context.data.environment(row.environment), row.degree)
         scene = Scene(
             row,
@@ -160,31 +161,41 @@ class Scenes:
         return scene._replace(light=_exposure(scene) * light)
 
     def _bake(self, name: str) -> None:
-        mesh = self._context.data.mesh(name)
         degree = self._degrees[name]
-        with self._context.time(f"{name}: bake at degree {degree}"):
-            baked = transfer.bake(
-                mesh, degree, directions=self._directions, seed=self._context.seed, progress=False
-            )
-            self._baked[name] = jax.block_until_ready(baked)
-        camera = imaging.Camera.facing(mesh, width=SIZE, height=SIZE)
-        self._meshes[name] = mesh, camera, imaging.rasterize(mesh, camera)
+        subject = load(self._context, name, degree, directions=self._directions)
+        camera = imaging.Camera.facing(subject.mesh, width=SIZE, height=SIZE)
+        self._baked[name] = subject.baked
+        self._meshes[name] = subject.mesh, camera, imaging.rasterize(subject.mesh, camera)
+
+
+@dataclasses.dataclass(frozen=True)
+class One:
+    """The fields of the configs that look at one scene."""
+
+    environment: str | None = None
+    """none means the first of the data"""
+    mesh: str | None = None
+    """none means the first of the data"""
+    frames: int = 3
+    """frames of each way, in turns"""
+    directions: int = 2048
+    """directions of the bake"""
+
+    def __post_init__(self):
+        if min(self.frames, self.directions) < 1:
+            raise ValueError("frames and directions must be at least 1")
+
+    def open(self, context: Context, degree: int) -> tuple[Row, Scenes]:
+        """The row of the table at this degree, and the scenes to load it from."""
+        [first] = rows_or_default(context, (), degree)
+        row = Row(self.environment or first.environment, self.mesh or first.mesh, degree)
+        return row, Scenes(context, [row], self.directions)
 
 
 def rows_or_default(context: Context, rows: Sequence[tuple[str, str, int]], degree: int = 4):
     """The rows of a config; where it has none, the first probe and mesh of the data."""
     first = (context.data.environments()[0], context.data.meshes()[0], degree)
     return [Row(*row) for row in rows or [first]]
-
-
-def cut(baked: transfer.Transfer, degree: int) -> transfer.Transfer:
-    """Its leading coefficients."""
-    return transfer.Transfer(
-        baked.coefficients[:, : harmonics.num_coefficients(degree)],
-        baked.positions,
-        baked.normals,
-        baked.neighbors,
-    )
 
 
 def vertex_psnr(

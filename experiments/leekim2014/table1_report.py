@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ..runner import Column, Table
+from ..shared.tables import GAINS, PSNR, RIVAL, named
 from .columns import IN_FULL, per_method
 from .methods import DIFFUSE, EIGHT_BITS, STILL, Method
 from .scenes import Row
@@ -41,13 +42,9 @@ def tables(
             Column("method", "method"),
             Column("gain", "gain against full", "gain_paper", digits=2),
             Column("gain_eight_bits", "against full, diffuse part of eight bits", digits=2),
-            Column("gain_product", "against product form", digits=2),
-            Column("gain_einsum", "against einsum", digits=2),
-            Column("psnr_image", "PSNR, dB: image", digits=1),
-            Column("psnr_object", "object", digits=1),
-            Column("psnr_vertex", "vertices", digits=1),
-            Column("rival", "truncation at its cost"),
-            Column("rival_psnr_object", "its object PSNR", digits=1),
+            *GAINS,
+            *PSNR,
+            *RIVAL,
         ],
         lines,
     )
@@ -65,8 +62,7 @@ def tables(
     yield Table(
         "Where the paper's gain holds",
         [
-            Column("method", "method"),
-            Column("against", "against"),
+            *named("method", "against"),
             Column("least", "gain: least", digits=2),
             Column("median", "median", digits=2),
             Column("most", "most", digits=2),
@@ -83,8 +79,7 @@ def tables(
     yield Table(
         "Light and eye both move",
         [
-            Column("environment", "environment"),
-            Column("mesh", "mesh"),
+            *named("environment", "mesh"),
             Column("moving_full_ms", "full, ms", digits=2),
             Column("moving_prepared_ms", "tiles, sets made before, ms", digits=2),
             Column("moving_gain", "gain, medians", digits=2),
@@ -224,7 +219,7 @@ def _goals(
         rows.append(("two_stage: image PSNR, dB", "≥ 41", least(by["two_stage"], "psnr_image")))
         gain = statistics.median(line["gain"] for line in by["two_stage"])
         rows.append(("two_stage: median gain", "≥ 1.1", f"{gain:.2f}"))
-    columns = [Column("goal", "goal"), Column("wanted", "wanted"), Column("got", "measured")]
+    columns = [*named("goal", "wanted"), Column("got", "measured")]
     return Table(
         "Goals", columns, [dict(zip(("goal", "wanted", "got"), r, strict=True)) for r in rows]
     )

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.tables import named
 from .columns import IN_FULL, per_method
 from .methods import (
     Method,
@@ -16,7 +17,7 @@ from .methods import (
     warm,
 )
 from .plots import draw_degrees
-from .scenes import Row, Scene, Scenes, rows_or_default
+from .scenes import One, Row, Scene
 
 # By degree: frames per second in full and adaptive, PSNR.
 PAPER = {
@@ -38,30 +39,24 @@ _FULL = "einsum", "product form", "full"
 
 
 @dataclasses.dataclass(frozen=True)
-class Table2:
-    environment: str | None = None
-    """none means the first of the data"""
-    mesh: str | None = None
-    """none means the first of the data"""
+class Table2(One):
     degrees: tuple[int, ...] = (2, 3, 4, 5)
     methods: tuple[Method, ...] = ("levels", "two_stage", "probes", "tiles")
     frames: int = 5
     """frames of each way, in turns"""
-    directions: int = 2048
-    """directions of the bake, at the highest degree"""
 
     def __post_init__(self):
+        super().__post_init__()
         if not self.degrees or min(self.degrees) < 2:
             raise ValueError("degrees must be one or more, from 2")
-        if not self.methods or min(self.frames, self.directions) < 1:
-            raise ValueError("methods must be one or more, frames and directions at least 1")
+        if not self.methods:
+            raise ValueError("methods must be one or more")
 
 
 @experiment("leekim2014.table2")
 def table2(config: Table2, context: Context) -> list[Table]:
-    [first] = rows_or_default(context, (), max(config.degrees))
-    row = Row(config.environment or first.environment, config.mesh or first.mesh, first.degree)
-    scene = Scenes(context, [row], config.directions).load(row)
+    row, scenes = config.open(context, max(config.degrees))
+    scene = scenes.load(row)
     for degree in context.progress(config.degrees, "degrees"):
         for line in _degree(config, context, scene.cut(degree)):
             context.record(line)
@@ -101,7 +96,7 @@ def _degree(config: Table2, context: Context, scene: Scene) -> Iterator[dict[str
 def _tables(config: Table2, rows: list[dict[str, Any]], row: Row) -> Iterator[Table]:
     frames = [line for line in rows if "fps full" in line]
     gains = [line for line in rows if "method" in line]
-    about = [Column("degree", "degree"), Column("coefficients", "coefficients")]
+    about = named("degree", "coefficients")
     yield Table(
         "Frames per second by degree",
         [

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.tables import GAINS, PSNR, named
 from .methods import (
     THRESHOLD,
     adaptive_way,
@@ -17,7 +18,7 @@ from .methods import (
     warm,
 )
 from .plots import draw_thresholds
-from .scenes import Row, Scene, Scenes, rows_or_default
+from .scenes import One, Row, Scene
 
 Filter = Literal["levels", "two_stage"]
 Variant = Literal["outside at the base", "4 rings", "refined", "smoothed", "refined, smoothed"]
@@ -33,34 +34,26 @@ _VARIANTS: dict[Variant, dict[str, Any]] = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Threshold:
-    environment: str | None = None
-    """none means the first of the data"""
-    mesh: str | None = None
-    """none means the first of the data"""
+class Threshold(One):
     degree: int = 4
     methods: tuple[Filter, ...] = ("levels", "two_stage")
     variants: tuple[Variant, ...] = tuple(_VARIANTS)
     """beside each method as it is"""
     thresholds: tuple[float, ...] = (0.005, 0.02, 0.08)
     """of specular change; that of diffuse change is half of it, as in the paper"""
-    frames: int = 3
-    """frames of each, in turns"""
-    directions: int = 2048
-    """directions of the bake"""
 
     def __post_init__(self):
-        if self.degree < 3 or min(self.frames, self.directions) < 1:
-            raise ValueError("degree must be at least 3, frames and directions at least 1")
+        super().__post_init__()
+        if self.degree < 3:
+            raise ValueError(f"degree must be at least 3, got {self.degree}")
         if not self.thresholds or min(self.thresholds) <= 0 or not self.methods:
             raise ValueError("methods must be one or more, and thresholds too, above 0")
 
 
 @experiment("leekim2014.threshold")
 def threshold(config: Threshold, context: Context) -> list[Table]:
-    [first] = rows_or_default(context, (), config.degree)
-    row = Row(config.environment or first.environment, config.mesh or first.mesh, config.degree)
-    scene = Scenes(context, [row], config.directions).load(row)
+    row, scenes = config.open(context, config.degree)
+    scene = scenes.load(row)
     for line in _rows(config, context, scene):
         context.record(line)
     caption = "error, share of vertices and gain by threshold; the paper's is marked"
@@ -101,17 +94,12 @@ def _tables(config: Threshold, rows: list[dict[str, Any]], row: Row) -> Iterator
     yield Table(
         "Variants by threshold",
         [
-            Column("method", "method"),
-            Column("variant", "variant"),
-            Column("threshold", "threshold"),
+            *named("method", "variant", "threshold"),
             Column("kept", "share kept", digits=3),
             Column("spent", "multiply-adds / full's", digits=3),
-            Column("psnr_image", "PSNR, dB: image", digits=1),
-            Column("psnr_object", "object", digits=1),
-            Column("psnr_vertex", "vertices", digits=1),
+            *PSNR,
             Column("gain", "gain against full", digits=2),
-            Column("gain_product", "against product form", digits=2),
-            Column("gain_einsum", "against einsum", digits=2),
+            *GAINS,
         ],
         rows,
         values={"row": row},

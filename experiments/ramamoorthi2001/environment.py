@@ -21,6 +21,7 @@ from jaxsh import harmonics, imaging, sphere
 
 from ..runner import Column, Context, Table, experiment
 from ..shared.plots import View, plt, save
+from ..shared.tables import named
 
 ALBEDO = 0.5
 Window = Literal["none", "hann", "lanczos", "dering light", "dering irradiance"]
@@ -185,8 +186,7 @@ def _exposed(image, exposure):
 
 def _tables(rows: list[dict[str, Any]]) -> Iterator[Table]:
     columns = [
-        Column("environment", "environment"),
-        Column("degree", "degree"),
+        *named("environment", "degree"),
         Column("mean_error", "mean error, %", paper="mean_error_paper", digits=2),
         Column("max_error", "largest, %", digits=1),
         Column("relative_error", "mean relative to the vertex, %", digits=1),

@@ -19,6 +19,7 @@ from jaxtyping import Array, Float
 from jaxsh import harmonics, imaging, sphere, transfer
 
 from ..runner import Column, Context, Table, experiment
+from ..shared.tables import named
 from .bake import OFFSET, Subject, bake, relative_error
 from .pictures import Picture, draw_errors, draw_sheet, draw_variants
 from .reference import Estimate, irradiance
@@ -194,8 +195,7 @@ def _tables(config: FirstLight, context: Context) -> Iterator[Table]:
     yield Table(
         "Meshes",
         [
-            Column("mesh", "mesh"),
-            Column("topology", "topology"),
+            *named("mesh", "topology"),
             Column("reported", "what the bake reported"),
         ],
         bakes,
@@ -248,8 +248,7 @@ def _worth(config: FirstLight, errors: list[dict[str, Any]]) -> Table:
             line[f"{row['variant']} to shadowed"] = row["error_to_shadowed"]
             line[f"{row['variant']} to one bounce"] = row["error_to_one_bounce"]
     columns = [
-        Column("mesh", "mesh"),
-        Column("environment", "environment"),
+        *named("mesh", "environment"),
         Column("unshadowed to shadowed", "unshadowed against shadowed, %", digits=1),
         Column("shadowed to shadowed", "shadowed against shadowed, %", digits=1),
         Column("unshadowed to one bounce", "unshadowed against one bounce, %", digits=1),

@@ -17,8 +17,9 @@ from experiments.annen2004.irradiance import (
 )
 from experiments.annen2004.methods import exact_samples, expand
 from experiments.annen2004.orders import answer, on_front
-from experiments.annen2004.scenes import cut, rectangle, three_lights
+from experiments.annen2004.scenes import cut, three_lights
 from experiments.runner.cli import main
+from experiments.shared.lights import rectangle
 
 OPTIONS = {
     "figure7": "--degree 1 --directions 64 --resolutions 32 --size 40 --samples 1",

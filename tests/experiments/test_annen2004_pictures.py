@@ -10,18 +10,13 @@ from PIL import Image
 from experiments.annen2004.figure1_5 import Figure15
 from experiments.annen2004.figure4 import Figure4
 from experiments.annen2004.figure6 import Figure6, _unfolded
-from experiments.annen2004.scenes import (
-    cut,
-    exact_expansion,
-    load,
-    psnr,
-    rectangle,
-    three_lights,
-)
+from experiments.annen2004.scenes import cut, exact_expansion, psnr, three_lights
 from experiments.annen2004.table1 import Table1
 from experiments.runner import Context, Data
 from experiments.runner.cli import main
+from experiments.shared.lights import rectangle
 from experiments.shared.plots import Panel, draw_panels
+from experiments.shared.subjects import load
 from jaxsh import midrange
 
 SMALL = ["--degree", "2", "--resolution", "16"]

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from experiments.habel2008.figure1_5 import sun_at_hour
-from experiments.habel2008.figure4 import measures, windowed
+from experiments.habel2008.figure4 import measures
 from experiments.habel2008.spheres import sun_at
 from experiments.runner.cli import main
+from experiments.shared.lights import windowed
 from jaxsh import sky
 
 
