@@ -14,22 +14,7 @@ from ..runner import Column, Context, Table, experiment
 from ..shared.lights import exact_light
 from ..shared.subjects import Subject, load
 from ..shared.tables import named
-from .irradiance import (
-    interpolate_records,
-    irradiance,
-    make_records,
-    record_places,
-)
-from .methods import (
-    EXPONENTS,
-    Rule,
-    Trial,
-    box_grid,
-    exact_samples,
-    expand,
-    inner_grid,
-    take,
-)
+from . import irradiance, methods
 from .plots import draw_claims
 from .scenes import cut, three_lights
 
@@ -81,7 +66,7 @@ def claims(config: Claims, context: Context) -> list[Table]:
     for distance in context.progress(config.distances, "distances"):
         lights = three_lights(distance, config.side)
         positions = subject.mesh.vertices.astype(float)
-        trial = Trial.of(subject, exact_light(lights, positions, config.degree))
+        trial = methods.Trial.of(subject, exact_light(lights, positions, config.degree))
         for row in _rows(config, trial, lights, places):
             context.record({"distance": distance} | row)
     middle = min(config.distances, key=lambda distance: abs(distance - 2))
@@ -107,8 +92,8 @@ def _places(config: Claims, subject: Subject, seed: int) -> dict[str, Float[Arra
         for count in config.counts
     }
     for n in config.grids:
-        places[f"grid {n}"] = box_grid(subject, n).points.astype(float)
-        places[f"inner {n}"] = inner_grid(subject, n).points.astype(float)
+        places[f"grid {n}"] = methods.box_grid(subject, n).points.astype(float)
+        places[f"inner {n}"] = methods.inner_grid(subject, n).points.astype(float)
     return places
 
 
@@ -116,17 +101,17 @@ def _expansions(
     places: Mapping[str, Array], lights: Sequence[midrange.Polygon], degree: int
 ) -> dict[str, midrange.Expansion]:
     """Exact ones of order 1, all at once."""
-    every = exact_samples(lights, jnp.concatenate(list(places.values())), degree)
+    every = methods.exact_samples(lights, jnp.concatenate(list(places.values())), degree)
     ends = np.cumsum([len(points) for points in places.values()])
     return {
-        name: take(every, slice(end - len(points), end))
+        name: methods.take(every, slice(end - len(points), end))
         for (name, points), end in zip(places.items(), ends.tolist(), strict=True)
     }
 
 
 def _rows(
     config: Claims,
-    trial: Trial,
+    trial: methods.Trial,
     lights: Sequence[midrange.Polygon],
     places: Mapping[str, Array],
 ) -> Iterator[dict[str, Any]]:
@@ -134,25 +119,28 @@ def _rows(
     positions = trial.subject.baked.positions
     for count in config.counts:
         samples = expansions[f"k-means {count}"]
-        by_rule: tuple[tuple[str, Rule], ...] = (NONE, "none"), (FULL, "full")
+        by_rule: tuple[tuple[str, methods.Rule], ...] = (NONE, "none"), (FULL, "full")
         for method, rule in by_rule:
             best = trial.blend(samples, rule)
             exponent = best.exponent if count > 1 else None
             yield {"method": method, "samples": count, "psnr": best.psnr, "exponent": exponent}
-    kinds: tuple[tuple[str, str, Rule], ...] = (
+    kinds: tuple[tuple[str, str, methods.Rule], ...] = (
         (TRILINEAR, "grid", "none"),
         (HALF, "grid", "half"),
         (INNER, "inner", "half"),
     )
     for count in config.grids:
-        grids = {"grid": box_grid(trial.subject, count), "inner": inner_grid(trial.subject, count)}
+        grids = {
+            "grid": methods.box_grid(trial.subject, count),
+            "inner": methods.inner_grid(trial.subject, count),
+        }
         for method, kind, rule in kinds:
             weights = grids[kind].weights(positions)
             radiance = trial.shade(expansions[f"{kind} {count}"], weights, rule)
             yield {"method": method, "samples": count**3, "psnr": trial.psnr(radiance)}
-    one = expand(lights, places["k-means 1"], config.degree, 3)
+    one = methods.expand(lights, places["k-means 1"], config.degree, 3)
     for order, name in ((2, "second order"), (3, "third order")):
-        radiance = trial.shade(cut(take(one, 0), order))
+        radiance = trial.shade(cut(methods.take(one, 0), order))
         yield {"method": f"{name}, one sample", "samples": 1, "psnr": trial.psnr(radiance)}
 
 
@@ -166,24 +154,24 @@ def _rivals(
     """Unshadowed: Ward & Heckbert's records against samples of the light, all exact."""
     mesh = subject.mesh
     positions, normals = mesh.vertices.astype(float), mesh.normals.astype(float)
-    exact = irradiance(lights, positions, normals) / jnp.pi
+    exact = irradiance.irradiance(lights, positions, normals) / jnp.pi
     bare = Subject(
         subject.name, mesh, transfer.bake(mesh, config.degree, shadows=False, progress=False)
     )
-    cut_off = Trial.of(bare, exact_light(lights, positions, config.degree))
+    cut_off = methods.Trial.of(bare, exact_light(lights, positions, config.degree))
     whole = cut_off._replace(reference=exact)
     for count in config.records:
-        chosen = record_places(np.asarray(positions), np.asarray(normals), count, seed)
-        records = make_records(lights, positions[chosen], normals[chosen])
+        chosen = irradiance.record_places(np.asarray(positions), np.asarray(normals), count, seed)
+        records = irradiance.make_records(lights, positions[chosen], normals[chosen])
         for gradients, name in ((False, "records, no gradients"), (True, "records, gradients")):
             best = max(
                 whole.psnr(
-                    interpolate_records(
+                    irradiance.interpolate_records(
                         records, positions, normals, gradients=gradients, exponent=exponent
                     )
                     / jnp.pi
                 )
-                for exponent in EXPONENTS
+                for exponent in methods.EXPONENTS
             )
             yield {"rival": f"Ward & Heckbert, {name}", "count": len(chosen), "whole": best}
     for name, samples in _expansions(places, lights, config.degree).items():
@@ -191,7 +179,7 @@ def _rivals(
         if kind == "grid":
             continue
         if kind == "inner":
-            weights = inner_grid(bare, int(number)).weights(bare.baked.positions)
+            weights = methods.inner_grid(bare, int(number)).weights(bare.baked.positions)
             radiance, title = cut_off.shade(samples, weights, "half"), INNER
         else:
             radiance, title = cut_off.blend(samples, "full").radiance, FULL
@@ -237,7 +225,7 @@ def _tables(
         list(lines.values()),
         values={
             "subject": subject,
-            "exponents": ", ".join(f"{b:g}" for b in EXPONENTS),
+            "exponents": ", ".join(f"{b:g}" for b in methods.EXPONENTS),
         },
     )
     yield _verdicts(config, errors, box)
@@ -277,8 +265,8 @@ def _verdicts(config: Claims, errors: list[dict[str, Any]], box: float) -> Table
                 "holds": _held(psnrs, enough),
             }
         )
-    columns = [*named("claim", "measured"), Column("holds", "holds")]
-    return Table("The paper's claims", columns, verdicts, values={"enough": enough, "box": box})
+
+    return Table("The paper's claims", rows=verdicts, values={"enough": enough, "box": box})
 
 
 def _span(psnrs: dict[float, float]) -> str:
@@ -320,12 +308,5 @@ def _goals(config: Claims, lines: dict[tuple[str, int], dict[str, Any]]) -> Tabl
 
 
 def _rival_table(config: Claims, rivals: list[dict[str, Any]], middle: float) -> Table:
-    columns = [
-        Column("rival", "method"),
-        Column("count", "samples"),
-        Column("whole", "PSNR against the whole irradiance, dB", digits=1),
-        Column("cut off", "against that of its degree, dB", digits=1),
-    ]
-    return Table(
-        "Irradiance gradients, the older rival", columns, rivals, values={"middle": middle}
-    )
+
+    return Table("Irradiance gradients, the older rival", rows=rivals, values={"middle": middle})

@@ -12,11 +12,10 @@ from jaxtyping import Array, Float
 
 from jaxsh import imaging, midrange, transfer
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.lights import exact_light
 from ..shared.plots import Panel, View, draw_panels
 from ..shared.subjects import Subject, load
-from ..shared.tables import named
 from .scenes import cut, exact_expansion, psnr, three_lights
 
 _WIDTH = 0.8  # of a panel, in its heights
@@ -166,16 +165,8 @@ def _draw(config: Figure15, path, view: View, shaded, reference: Float[Array, "v
 
 
 def _tables(config: Figure15, rows: list[dict[str, Any]]) -> Iterator[Table]:
-    columns = [
-        Column("mesh", "mesh"),
-        Column("source", "light from"),
-        Column("method", "method"),
-        Column("psnr_object", "PSNR of the object's pixels, dB", digits=1),
-        Column("psnr_picture", "of the whole picture, dB", digits=1),
-        Column("psnr_vertices", "of the vertices, dB", digits=1),
-        Column("relative", "relative RMS error of the vertices, %", digits=2),
-    ]
-    yield Table("Three area lights", columns, rows)
+
+    yield Table("Three area lights", rows=rows)
     yield _goals(rows)
 
 
@@ -193,9 +184,5 @@ def _goals(rows: list[dict[str, Any]]) -> Table:
             ("2³ grid, half gradient, exact", 49.0, exact["2³ grid, half gradient"]),
         ):
             lines.append({"mesh": mesh, "goal": goal, "least": least, "measured": measured})
-    columns = [
-        *named("mesh", "goal"),
-        Column("least", "at least, dB", digits=1),
-        Column("measured", "measured, dB", digits=1),
-    ]
-    return Table("Goals", columns, lines)
+
+    return Table("Goals", rows=lines)

@@ -14,7 +14,6 @@ from jaxsh import imaging, midrange
 from ..runner import Column, Context, Table, experiment
 from ..shared.plots import Panel, View, draw_panels
 from ..shared.subjects import Subject, load
-from ..shared.tables import named
 from .dots import glass
 from .methods import Trial, box_grid, take
 from .overlap import overlapping, overlapping_light
@@ -206,5 +205,5 @@ def _verdicts(config: Figure7, rows: list[dict[str, Any]]) -> Table:
         {"claim": claim, "measured": measured, "holds": "yes" if holds else "no"}
         for claim, measured, holds in lines
     ]
-    columns = [*named("claim", "measured"), Column("holds", "holds")]
-    return Table("What the paper says of it", columns, verdicts)
+
+    return Table("What the paper says of it", rows=verdicts)

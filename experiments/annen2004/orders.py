@@ -175,16 +175,10 @@ def _cheapest(rows: Sequence[dict[str, Any]], vertices: int, exact: float) -> Ta
         if good:
             best = min(good, key=lambda row: row["total"])
             lines.append({"target": target} | best)
-    columns = [
-        Column("target", "at least, dB"),
-        *named("samples", "order"),
-        Column("total", "total, ms", digits=2),
-        Column("exact", "PSNR, exact terms, dB", digits=1),
-    ]
+
     return Table(
         "The cheapest way to a quality",
-        columns,
-        lines,
+        rows=lines,
         values={
             "answer": answer(rows),
             "exact": exact,

@@ -242,15 +242,8 @@ def _tables(
             "exponents": ", ".join(f"{b:g}" for b in EXPONENTS),
         },
     )
-    columns = [
-        *named("frame", "samples", "added", "removed"),
-        Column("predicted", "error predicted, %", digits=2),
-        Column("error", "at all vertices, %", digits=2),
-        Column("one", "of one sample, %", digits=2),
-        Column("eight", "of eight that stay, %", digits=2),
-        Column("psnr", "PSNR, dB", digits=1),
-    ]
-    yield Table("Samples that come and go", columns, frames, _verdict(config, frames))
+
+    yield Table("Samples that come and go", rows=frames, note=_verdict(config, frames))
 
 
 def _verdict(config: Placement, frames: list[dict[str, Any]]) -> str:

@@ -10,10 +10,9 @@ import numpy as np
 
 from jaxsh import geometry, imaging, midrange, transfer
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.lights import exact_light
 from ..shared.subjects import Subject, load
-from ..shared.tables import named
 from ..shared.timing import timed
 from .scenes import three_lights
 
@@ -172,41 +171,14 @@ def _tables(
     models = [row for row in rows if "frame ratio" in row]
     yield Table(
         "Frames per second",
-        [
-            Column("mesh", "mesh"),
-            Column("vertices", "vertices", "vertices_paper"),
-            Column("frame without", "without gradient", "without_paper", digits=1),
-            Column("frame with", "with gradient", "with_paper", digits=1),
-            Column("frame ratio", "with / without", "ratio_paper", digits=2),
-            Column(f"frame {_EXACT}", f"{_EXACT}", digits=1),
-        ],
-        models,
+        rows=models,
         values={"size": _SIZE},
     )
-    yield Table(
-        "The same without the raster",
-        [
-            Column("mesh", "mesh"),
-            Column("still without", "without gradient", digits=1),
-            Column("still with", "with gradient", digits=1),
-            Column("still ratio", "with / without", "ratio_paper", digits=2),
-            Column(f"still {_EXACT}", f"{_EXACT}", digits=1),
-        ],
-        models,
-    )
-    yield Table(
-        "Milliseconds by stage",
-        [
-            Column("mesh", "mesh"),
-            Column("way", "gradient"),
-            *(Column(stage, stage, digits=2) for stage in (*_STAGES, "frame")),
-        ],
-        stages,
-    )
+    yield Table("The same without the raster", rows=models)
+    yield Table("Milliseconds by stage", rows=stages)
     yield Table(
         "Goals",
-        [*named("goal", "limit"), Column("measured", "measured")],
-        _goals(models[0], stages[:2]),
+        rows=_goals(models[0], stages[:2]),
         values={"mesh": models[0]["mesh"]},
     )
 

@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 
 from jaxsh import harmonics, sky, sphere
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.timing import fastest, timed
 from .numpy_twin import polynomial, projection
 from .suns import PLAIN, TURBIDITY, ZENITH, Suns, polynomials, project
@@ -239,12 +239,8 @@ def _memory(context: Context) -> Table:
             )
     for row in rows:
         context.record(row)
-    columns = [
-        Column("what", "table"),
-        Column("made of", "made of"),
-        Column("bytes", "bytes", paper="bytes_paper"),
-    ]
-    return Table("Memory", columns, rows)
+
+    return Table("Memory", rows=rows)
 
 
 def _stored() -> dict[str, np.ndarray]:
@@ -254,15 +250,8 @@ def _stored() -> dict[str, np.ndarray]:
 
 def _times(config: Cost, rows: list[dict[str, Any]]) -> Iterator[Table]:
     timed = [row for row in rows if "way" in row]
-    columns = [
-        Column("way", "way"),
-        Column("one_us", "one sun, µs", paper="one_us_paper", digits=1),
-        Column("per_sun_us", "each of a batch, µs", digits=2),
-        Column("suns", "suns of the batch"),
-        Column("error", "worst E_mean, %"),
-        Column("relative", "worst relative error, %"),
-    ]
-    yield Table("Time for 7 bands", columns, timed, values={"verdict": verdict(timed)})
+
+    yield Table("Time for 7 bands", rows=timed, values={"verdict": verdict(timed)})
 
 
 def verdict(rows: list[dict[str, Any]]) -> str:

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from jaxsh import geometry, imaging, sky, transfer
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.plots import Panel, animate, draw_panels
 from ..shared.timing import timed
 from .spheres import LUMINANCE
@@ -285,18 +285,9 @@ def _caption(frame: Frame) -> str:
 
 
 def _table(config: Figure15, context: Context, chosen) -> Table:
-    columns = [
-        Column("hour", "solar time, h", digits=1),
-        Column("elevation", "sun's height, degrees", digits=1),
-        Column("sky", "level ground's illuminance by the sky, klx", digits=2),
-        Column("sun", "by the sun, klx", digits=2),
-        Column("sunlit", "samples in the sun, %", digits=0),
-        Column("shade_ms", "coefficients and shading, ms", digits=2),
-        Column("frame_ms", "the whole picture, ms", digits=0),
-    ]
+
     return Table(
         "Through the day",
-        columns,
-        [context.rows[i] for i in chosen],
+        rows=[context.rows[i] for i in chosen],
         values={"bake_seconds": context.times["bake"]["seconds"], "adaptation": _ADAPTATION},
     )

@@ -10,18 +10,9 @@ from jaxtyping import Array, Float
 
 from jaxsh import harmonics, sky, sphere
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.plots import plt, save
-from ..shared.tables import named
-from .spheres import (
-    LUMINANCE,
-    mean_luminance,
-    show_scale,
-    show_signed,
-    show_sphere,
-    sky_picture,
-    sun_at,
-)
+from . import spheres
 
 _HEIGHT = 90
 
@@ -65,7 +56,7 @@ def figure2(config: Figure2, context: Context) -> Table:
             indexing="ij",
         )
     )
-    suns = jnp.asarray(np.stack([sun_at(angle) for angle in zenith]))
+    suns = jnp.asarray(np.stack([spheres.sun_at(angle) for angle in zenith]))
     with context.time("exact projection"):
         exact = jax.block_until_ready(sky.project_preetham(suns, jnp.asarray(turbidity)))
     smallest = sky.smallest_luminance(suns, jnp.asarray(turbidity))
@@ -95,23 +86,17 @@ def figure2(config: Figure2, context: Context) -> Table:
     _draw(context.path("figure2.png", caption), cases, config.bands)
     return Table(
         "The fit at its worst",
-        [
-            *named("model", "bands"),
-            Column("zenith", "sun from the zenith, degrees", digits=1),
-            Column("turbidity", "turbidity", digits=2),
-            Column("error", "E_mean there, %", digits=4),
-            Column("pixel", "largest error of the luminance, % of the mean sky", digits=4),
-            Column("truncation", "RMS of what the bands leave out, % of the mean sky", digits=1),
-        ],
     )
 
 
 def _row(case: Worst, bands: int, error: float) -> dict:
     exact, fitted = (c[:, : bands**2] for c in (case.exact, case.fitted))
-    mean = mean_luminance(case.exact)
-    difference = sphere.reconstruct_lat_long(fitted - exact, _HEIGHT, 2 * _HEIGHT) @ LUMINANCE
-    itself = sky_picture(sun_at(case.zenith), case.turbidity, _HEIGHT)
-    left = (sphere.reconstruct_lat_long(exact, _HEIGHT, 2 * _HEIGHT) - itself) @ LUMINANCE
+    mean = spheres.mean_luminance(case.exact)
+    difference = (
+        sphere.reconstruct_lat_long(fitted - exact, _HEIGHT, 2 * _HEIGHT) @ spheres.LUMINANCE
+    )
+    itself = spheres.sky_picture(spheres.sun_at(case.zenith), case.turbidity, _HEIGHT)
+    left = (sphere.reconstruct_lat_long(exact, _HEIGHT, 2 * _HEIGHT) - itself) @ spheres.LUMINANCE
     weights = sphere.lat_long(_HEIGHT, 2 * _HEIGHT).weights.reshape(left.shape) / (4 * np.pi)
     return {
         "model": case.model,
@@ -139,10 +124,10 @@ def _draw(path, cases: list[Worst], bands: tuple[int, ...]) -> None:
 
 
 def _draw_case(figure, axes, case: Worst, bands: tuple[int, ...]) -> None:
-    mean = mean_luminance(case.exact)
-    itself = sky_picture(sun_at(case.zenith), case.turbidity, _HEIGHT)
+    mean = spheres.mean_luminance(case.exact)
+    itself = spheres.sky_picture(spheres.sun_at(case.zenith), case.turbidity, _HEIGHT)
     title = f"the sky: sun {90 - case.zenith:.0f}° up, turbidity {case.turbidity:g}"
-    show_sphere(axes[0, 0], itself, 0.5 / mean, title)
+    spheres.show_sphere(axes[0, 0], itself, 0.5 / mean, title)
     axes[1, 0].axis("off")
     axes[1, 0].text(0.5, 0.5, f"{case.model}\n→", ha="center", va="center", fontsize=10)
     differences = []
@@ -151,11 +136,11 @@ def _draw_case(figure, axes, case: Worst, bands: tuple[int, ...]) -> None:
             sphere.reconstruct_lat_long(c[:, : harmonics.num_coefficients(count - 1)], 90, 180)
             for c in (case.exact, case.fitted)
         )
-        show_sphere(axes[0, column], exact, 0.5 / mean, f"exact, {count} bands")
-        show_sphere(axes[1, column], fitted, 0.5 / mean, f"fitted, {count} bands")
-        differences.append(100 * np.asarray((fitted - exact) @ LUMINANCE) / mean)
+        spheres.show_sphere(axes[0, column], exact, 0.5 / mean, f"exact, {count} bands")
+        spheres.show_sphere(axes[1, column], fitted, 0.5 / mean, f"fitted, {count} bands")
+        differences.append(100 * np.asarray((fitted - exact) @ spheres.LUMINANCE) / mean)
     limit = max(float(np.abs(d).max()) for d in differences)
     for axis, difference in zip(axes[2, 1:], differences, strict=True):
         largest = np.abs(difference).max()
-        show_signed(axis, difference, limit, f"difference: to {largest:.2g} % of mean")
-    show_scale(axes[2, 0], limit, "% of the mean sky")
+        spheres.show_signed(axis, difference, limit, f"difference: to {largest:.2g} % of mean")
+    spheres.show_scale(axes[2, 0], limit, "% of the mean sky")

@@ -19,8 +19,7 @@ from jaxtyping import Array, Float
 
 from jaxsh import harmonics, sky
 
-from ..runner import Column, Context, Table, experiment
-from ..shared.tables import named
+from ..runner import Context, Table, experiment
 from .suns import PLAIN, TURBIDITY, ZENITH, Columns, Suns, polynomials, project, scaled
 
 _TOLERANCE = float(np.finfo(np.float64).eps) ** 0.5  # what the package's own solvers take
@@ -215,29 +214,11 @@ _SOLVERS: dict[str, Solve] = {
 
 
 def _tables(config: Solvers, problem: Problem, rows: list[dict[str, Any]]) -> Iterator[Table]:
-    columns = [
-        *named("basis", "solver", "steps"),
-        Column("result", "what it says"),
-        Column("residual", "residual / the least"),
-        Column("error", "E_mean in float64, %"),
-        Column("error_float32", "evaluated in float32, %"),
-    ]
     problems, samples = problem.targets.shape
     yield Table(
         "Solvers by basis",
-        columns,
-        rows,
+        rows=rows,
         values={"problems": problems, "samples": samples, "tolerance": _TOLERANCE},
     )
     lines = [row for row in rows if row["solver"] == next(iter(_SOLVERS))]
-    yield Table(
-        "Bases",
-        [
-            columns[0],
-            Column("condition", "condition number"),
-            Column("largest", "largest coefficient"),
-            columns[-2],
-            columns[-1],
-        ],
-        lines,
-    )
+    yield Table("Bases", rows=lines)

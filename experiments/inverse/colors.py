@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear, nnls
 
 from jaxsh import inverse, midrange, transfer
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.subjects import double, load
 from ..shared.timing import timed
 from .lights import lamp, shade, some, with_noise
@@ -145,20 +145,10 @@ def _table(config: Colors, context: Context, name: str, total: int, problem: Pro
                     "ms": 1e3 * float(np.median([r["seconds"] for r in of])),
                 }
             )
-    columns = [
-        Column("noise", "noise, %", digits=1),
-        Column("method", "method"),
-        Column("error", "lights that are on: RMS error"),
-        Column("off", "the light that is off: RMS"),
-        Column("least", "least radiance"),
-        Column("negative", "draws with a negative one", digits=0),
-        Column("gap", "most apart from nnls"),
-        Column("ms", "time, ms", digits=1),
-    ]
+
     return Table(
         "Colours of known lights",
-        columns,
-        rows,
+        rows=rows,
         values={
             "name": name,
             "seen": len(problem.matrix),

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxsh import inverse, midrange, transfer
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.subjects import double, load
 from ..shared.timing import timed
 from .emitters_picture import Scene, draw
@@ -226,23 +226,9 @@ def _table(config: Emitters, context: Context, name: str, total: int, seen: int)
                 values = np.concatenate([np.atleast_1d(r[f"{key}_{what}"]) for r in of])
                 row[f"{key}_{what}"] = unit * float(np.sqrt(np.mean(values**2)))
         rows.append(row)
-    columns = [
-        Column("lights", "lights", digits=0),
-        Column("noise", "noise, %", digits=1),
-        Column("center_error", "centre: RMS error, radii"),
-        Column("center_deviation", "expected by the fit"),
-        Column("size_error", "size, %"),
-        Column("size_deviation", "expected"),
-        Column("radiance_error", "colour, %"),
-        Column("radiance_deviation", "expected"),
-        Column("failed", "not converged", digits=0),
-        Column("agreeing", "starts that end in the same place, %", digits=0),
-        Column("steps", "steps", digits=0),
-        Column("seconds", "time, s", digits=1),
-    ]
+
     return Table(
         "Area lights from a shaded mesh",
-        columns,
-        rows,
+        rows=rows,
         values={"name": name, "seen": seen, "total": total},
     )

@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 from jaxsh import inverse, sky, transfer
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.subjects import double, load
 from ..shared.timing import timed
 from .pictures import Case, draw_errors, draw_sky
@@ -136,21 +136,9 @@ def _table(config: InverseSky, context: Context, name: str, vertices: int) -> Ta
                 "ms": 1e3 * float(np.median([row["seconds"] for row in of])),
             }
         )
-    columns = [
-        Column("noise", "noise, %", digits=1),
-        Column("sun", "sun: RMS error, degrees"),
-        Column("sun_worst", "worst"),
-        Column("sun_said", "expected by the fit"),
-        Column("turbidity", "turbidity: RMS error"),
-        Column("turbidity_worst", "worst"),
-        Column("turbidity_said", "expected by the fit"),
-        Column("failed", "not converged", digits=0),
-        Column("agreeing", "starts that end in the same place, %", digits=0),
-        Column("ms", "time of a fit, ms", digits=0),
-    ]
+
     return Table(
         "Sun and turbidity from a shaded mesh",
-        columns,
-        rows,
+        rows=rows,
         values={"name": name, "vertices": vertices},
     )

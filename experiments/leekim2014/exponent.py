@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..runner import Column, Context, Table, experiment
-from ..shared.tables import GAINS, PSNR, RIVAL, named
+from ..runner import Context, Table, experiment
 from .methods import (
     METHODS,
     Method,
@@ -21,7 +20,7 @@ from .methods import (
     warm,
 )
 from .plots import draw_exponents
-from .scenes import One, Row, Scene
+from .scenes import One, Scene
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +45,7 @@ def exponent(config: Exponent, context: Context) -> list[Table]:
             context.record(line)
     caption = "error and gain by the lobe's exponent; a rival without error is left out"
     draw_exponents(context.path("exponent.png", caption), context.rows)
-    return list(_tables(config, context.rows, row))
+    return [Table("Errors and gains by exponent", values={"row": row})]
 
 
 def _rows(
@@ -68,26 +67,8 @@ def _rows(
             "gain_product": times["product form"] / spent,
             "gain_einsum": times["einsum"] / spent,
         }
+        line["kept"] = None
         if "specular" in result.kept:
             line["kept"] = float(np.ravel(np.asarray(result.kept["specular"]))[-1])
         line |= scene.quality(color(result), reference).named()
         yield line | rival(spent, times, truncated)
-
-
-def _tables(config: Exponent, rows: list[dict[str, Any]], row: Row) -> Iterator[Table]:
-    columns = [
-        *named("exponent", "method"),
-        *PSNR,
-        Column("gain", "gain against full", digits=2),
-        *GAINS,
-        Column("kept", "share kept", digits=3),
-        *RIVAL,
-    ]
-    if not any("kept" in line for line in rows):
-        columns = [column for column in columns if column.key != "kept"]
-    yield Table(
-        "Errors and gains by exponent",
-        columns,
-        rows,
-        values={"row": row},
-    )

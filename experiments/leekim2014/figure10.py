@@ -8,7 +8,7 @@ from typing import Literal
 import jax
 import numpy as np
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.lights import windowed
 from ..shared.plots import Panel, animate, draw_panels, plt, save
 from .figure1 import BASE
@@ -168,14 +168,5 @@ def _moving(
 
 
 def _table(config: Figure10, context: Context) -> Table:
-    columns = [
-        Column("window", "window of the light"),
-        Column("method", "method"),
-        Column("psnr", "PSNR of the vertices, dB", digits=1),
-        Column("flicker", "RMS change of the error per frame", digits=5),
-        Column("worst", "in the worst frame", digits=5),
-        Column("pop", "worst of one vertex in 1000", digits=4),
-        Column("switched", "degree changes, share of vertices", digits=3),
-        Column("motion", "RMS change of the full computation", digits=5),
-    ]
-    return Table("A spinning mesh", columns, context.rows)
+
+    return Table("A spinning mesh", rows=context.rows)

@@ -10,9 +10,8 @@ from jaxtyping import Array, Float
 
 from jaxsh import adaptive, harmonics, transfer
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.plots import Panel, draw_panels
-from ..shared.tables import named
 from .pictures import Canvas, Look, evened
 from .scenes import ALBEDO, Scene, Scenes, rows_or_default
 
@@ -131,13 +130,5 @@ def _regions(levels: list[Level], threshold: float) -> dict[int, Array]:
 
 
 def _table(config: Figure8, rows: list[dict[str, Any]]) -> Table:
-    columns = [
-        Column("environment", "probe"),
-        *named("mesh", "level"),
-        Column("rms", "RMS change since the base", digits=4),
-        Column("left", "RMS that higher levels add", digits=4),
-        Column("darker", "share of vertices that darken", digits=2),
-        Column("above", "share that changes by the threshold", digits=2),
-        Column("kept", "share that the filter keeps", digits=2),
-    ]
-    return Table("Diffuse light by level", columns, rows)
+
+    return Table("Diffuse light by level", rows=rows)

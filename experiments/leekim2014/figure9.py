@@ -4,22 +4,12 @@ import dataclasses
 
 from ..runner import Context, Table, experiment
 from ..shared.plots import Panel, draw_panels
-from .figure1 import (
-    BASE,
-    FILTER,
-    TILES,
-    WHOLE,
-    Shading,
-    columns,
-    measured,
-    shadings,
-    truncated,
-)
+from . import figure1
 from .pictures import Canvas, Look, evened
 from .scenes import Scene, Scenes, rows_or_default
 
 _PSNR, _GAIN = 43.87, 3.0  # of the paper's figure 9
-_BASE = f"base, degree {BASE}"
+_BASE = f"base, degree {figure1.BASE}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,11 +25,11 @@ def figure9(config: Figure9, context: Context) -> Table:
     for row in context.progress(rows, "scenes"):
         scene = scenes.load(row)
         full = scene.full()
-        base = Shading(_BASE, truncated(scene, BASE), {})
-        by = {one.method: one for one in (base, *shadings(scene, config))}
+        base = figure1.Shading(_BASE, figure1.truncated(scene, figure1.BASE), {})
+        by = {one.method: one for one in (base, *figure1.shadings(scene, config))}
         for shading in by.values():
-            line = measured(scene, shading, full)
-            if shading.method == FILTER:
+            line = figure1.measured(scene, shading, full)
+            if shading.method == figure1.FILTER:
                 line |= {"psnr_paper": _PSNR}
             context.record(line)
         name = f"{row.mesh}_{row.environment}.png"
@@ -51,19 +41,21 @@ def figure9(config: Figure9, context: Context) -> Table:
         _draw(config, context.path(name, caption), scene, full, by)
     return Table(
         "Base, full and adaptive",
-        columns(),
+        figure1.columns(),
     )
 
 
-def _draw(config: Figure9, path, scene: Scene, full, by: dict[str, Shading]) -> None:
+def _draw(config: Figure9, path, scene: Scene, full, by: dict[str, figure1.Shading]) -> None:
     canvas = Canvas.of(scene, config.size, config.samples)
-    base, ours, whole, tiles = (by[name] for name in (_BASE, FILTER, WHOLE, TILES))
+    base, ours, whole, tiles = (
+        by[name] for name in (_BASE, figure1.FILTER, figure1.WHOLE, figure1.TILES)
+    )
     target = scene.row.degree
     specular, diffuse = (
-        canvas.levels(ours.reached[kind], BASE, target) for kind in ("specular", "diffuse")
+        canvas.levels(ours.reached[kind], figure1.BASE, target) for kind in ("specular", "diffuse")
     )
     above = [
-        Panel(canvas.shown(base.color), f"(a) base, degree {BASE}"),
+        Panel(canvas.shown(base.color), f"(a) base, degree {figure1.BASE}"),
         Panel(canvas.shown(full), f"(b) full, degree {target}"),
         Panel(canvas.shown(ours.color), "(c) the filter"),
         Panel(specular, "(d) specular, degrees"),

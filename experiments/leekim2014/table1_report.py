@@ -5,9 +5,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ..runner import Column, Table
-from ..shared.tables import GAINS, PSNR, RIVAL, named
 from .columns import IN_FULL, per_method
-from .methods import DIFFUSE, EIGHT_BITS, STILL, Method
+from .methods import STILL, Method
 from .scenes import Row
 
 # What figures 1 and 9 print, of scenes that the paper does not name.
@@ -33,89 +32,31 @@ def tables(
             *per_method("fps", methods, "adaptive_paper"),
         ],
         scenes,
-        values={"checked": _checked(scenes)},
+        values={"apart": max(row["largest_difference"] for row in scenes)},
     )
     yield Table(
         "Gains and errors",
-        [
-            *names,
-            Column("method", "method"),
-            Column("gain", "gain against full", "gain_paper", digits=2),
-            Column("gain_eight_bits", "against full, diffuse part of eight bits", digits=2),
-            *GAINS,
-            *PSNR,
-            *RIVAL,
-        ],
-        lines,
+        rows=lines,
     )
     yield Table(
         "The diffuse part in eight bits",
-        [
-            *names,
-            Column(f"{DIFFUSE}, ms", "float32, ms", digits=2),
-            Column(f"{EIGHT_BITS}, ms", "eight bits, ms", digits=2),
-            Column("psnr_eight_bits", "object PSNR, dB", digits=1),
-        ],
-        scenes,
+        rows=scenes,
     )
     summed = gains(lines)
     yield Table(
         "Where the paper's gain holds",
-        [
-            *named("method", "against"),
-            Column("least", "gain: least", digits=2),
-            Column("median", "median", digits=2),
-            Column("most", "most", digits=2),
-            Column("faster", "scenes faster"),
-            Column("holds", f"scenes ≥ {_PAPER_LEAST} ×"),
-            Column("scenes", "scenes"),
-        ],
-        summed,
-        verdict(summed),
+        rows=summed,
+        note=verdict(summed),
     )
     if "masks" in methods:
-        yield _filtering(scenes, names)
+        yield Table("Filtering ratios", rows=scenes)
     yield _summary(lines)
     yield Table(
         "Light and eye both move",
-        [
-            *named("environment", "mesh"),
-            Column("moving_full_ms", "full, ms", digits=2),
-            Column("moving_prepared_ms", "tiles, sets made before, ms", digits=2),
-            Column("moving_gain", "gain, medians", digits=2),
-            Column("moving_gain_mean", "means", digits=2),
-            Column("moving_following_ms", "tiles, sets made on the way, ms", digits=2),
-            Column("moving_following_gain", "gain, medians", digits=2),
-            Column("moving_following_gain_mean", "means", digits=2),
-            Column("moving_psnr", "vertex PSNR, dB: mean", digits=1),
-            Column("moving_psnr_worst", "worst", digits=1),
-            Column("atlas_seconds", "atlas, s", digits=1),
-            Column("sets", "sets of the path"),
-            Column("sets_seconds", "made in, s", digits=2),
-            Column("sets_megabytes", "MB", digits=1),
-        ],
-        [row for row in rows if "moving_gain" in row],
+        rows=[row for row in rows if "moving_gain" in row],
         values={"step": step, "views": views},
     )
     yield _goals(scenes, lines, [row for row in rows if "moving_gain" in row])
-
-
-def _checked(scenes: list[dict[str, Any]]) -> str:
-    worst = max(row["largest_difference"] for row in scenes)
-    return f"The four full forms differ by at most {worst:.1e} in exposed colour."
-
-
-def _filtering(scenes: list[dict[str, Any]], names: list[Column]) -> Table:
-    return Table(
-        "Filtering ratios",
-        [
-            *names,
-            Column("filtered_diffuse", "diffuse", "diffuse_paper", digits=2),
-            Column("filtered_specular", "specular", "specular_paper", digits=2),
-            Column("filtered_specular_mean", "specular, mean of levels", digits=2),
-        ],
-        scenes,
-    )
 
 
 def _summary(lines: list[dict[str, Any]]) -> Table:
@@ -134,18 +75,8 @@ def _summary(lines: list[dict[str, Any]]) -> Table:
             values = [line[key] for line in mine]
             row |= {key: statistics.median(values), f"{key} least": min(values)}
         rows.append(row)
-    columns = [
-        Column("what", "what"),
-        Column("psnr_image", "image PSNR, dB: median", digits=2),
-        Column("psnr_image least", "least", digits=2),
-        Column("psnr_object", "object PSNR, dB: median", digits=2),
-        Column("psnr_object least", "least", digits=2),
-        Column("gain", "gain against full: median", digits=2),
-        Column("gain least", "least", digits=2),
-        Column("gain_product", "against product form: median", digits=2),
-        Column("gain_einsum", "against einsum: median", digits=2),
-    ]
-    return Table("Beside figures 1 and 9", columns, rows)
+
+    return Table("Beside figures 1 and 9", rows=rows)
 
 
 def _by_method(lines: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
@@ -219,10 +150,8 @@ def _goals(
         rows.append(("two_stage: image PSNR, dB", "≥ 41", least(by["two_stage"], "psnr_image")))
         gain = statistics.median(line["gain"] for line in by["two_stage"])
         rows.append(("two_stage: median gain", "≥ 1.1", f"{gain:.2f}"))
-    columns = [*named("goal", "wanted"), Column("got", "measured")]
-    return Table(
-        "Goals", columns, [dict(zip(("goal", "wanted", "got"), r, strict=True)) for r in rows]
-    )
+
+    return Table("Goals", rows=[dict(zip(("goal", "wanted", "got"), r, strict=True)) for r in rows])
 
 
 def _of(method: str, gain: float, by: dict[str, list[dict[str, Any]]], count: int) -> str:

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.tables import named
 from .columns import IN_FULL, per_method
 from .methods import (
@@ -117,16 +117,7 @@ def _tables(config: Table2, rows: list[dict[str, Any]], row: Row) -> Iterator[Ta
     )
     yield Table(
         "Gains by degree",
-        [
-            *about,
-            Column("method", "method"),
-            Column("gain full", "gain against full", "gain_paper", digits=2),
-            Column("gain product form", "against product form", digits=2),
-            Column("gain einsum", "against einsum", digits=2),
-            Column("psnr_object", "object PSNR, dB", digits=1),
-            Column("psnr_vertex", "vertices", digits=1),
-        ],
-        gains,
+        rows=gains,
     )
     lines = [
         {"method": method}
@@ -136,14 +127,7 @@ def _tables(config: Table2, rows: list[dict[str, Any]], row: Row) -> Iterator[Ta
     ]
     yield Table(
         "Break-even",
-        [
-            Column("method", "method"),
-            Column("full", "against full"),
-            Column("product form", "against product form"),
-            Column("einsum", "against einsum"),
-            Column("paper", "the paper's, against its own full"),
-        ],
-        lines,
+        rows=lines,
     )
 
 

@@ -6,8 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..runner import Column, Context, Table, experiment
-from ..shared.tables import GAINS, PSNR, named
+from ..runner import Context, Table, experiment
 from .methods import (
     THRESHOLD,
     adaptive_way,
@@ -93,15 +92,7 @@ def _rows(config: Threshold, context: Context, scene: Scene) -> Iterator[dict[st
 def _tables(config: Threshold, rows: list[dict[str, Any]], row: Row) -> Iterator[Table]:
     yield Table(
         "Variants by threshold",
-        [
-            *named("method", "variant", "threshold"),
-            Column("kept", "share kept", digits=3),
-            Column("spent", "multiply-adds / full's", digits=3),
-            *PSNR,
-            Column("gain", "gain against full", digits=2),
-            *GAINS,
-        ],
-        rows,
+        rows=rows,
         values={"row": row},
     )
     limit = min(config.thresholds, key=lambda one: abs(one - THRESHOLD))
@@ -109,14 +100,7 @@ def _tables(config: Threshold, rows: list[dict[str, Any]], row: Row) -> Iterator
     if choices:
         yield Table(
             "What each choice does",
-            [
-                Column("method", "method"),
-                Column("variant", "choice"),
-                Column("psnr", "object PSNR, dB: change", digits=2),
-                Column("time", "time: factor", digits=2),
-                Column("judgement", "so it"),
-            ],
-            choices,
+            rows=choices,
             values={"limit": limit},
         )
 

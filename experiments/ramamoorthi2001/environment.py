@@ -19,9 +19,8 @@ from matplotlib.colors import Normalize
 
 from jaxsh import harmonics, imaging, sphere
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from ..shared.plots import View, plt, save
-from ..shared.tables import named
 
 ALBEDO = 0.5
 Window = Literal["none", "hann", "lanczos", "dering light", "dering irradiance"]
@@ -185,31 +184,11 @@ def _exposed(image, exposure):
 
 
 def _tables(rows: list[dict[str, Any]]) -> Iterator[Table]:
-    columns = [
-        *named("environment", "degree"),
-        Column("mean_error", "mean error, %", paper="mean_error_paper", digits=2),
-        Column("max_error", "largest, %", digits=1),
-        Column("relative_error", "mean relative to the vertex, %", digits=1),
-        Column("psnr", "PSNR of the object, dB", digits=2),
-        Column("negative_light", "negative light, %", digits=2),
-    ]
-    rounding = max(row["reference_rounding"] for row in rows)
-    yield Table(
-        "Irradiance from spherical harmonics",
-        columns,
-        [row for row in rows if row["window"] == "none"],
-        values={"rounding": rounding},
-    )
-    yield Table(
-        "The same under windows",
-        [
-            *columns[:2],
-            Column("window", "window"),
-            *columns[2:],
-            Column("strength", "dering's strength"),
-        ],
-        [row | {"mean_error_paper": None} for row in rows if row["window"] != "none"],
-    )
+    plain = [row for row in rows if row["window"] == "none"]
+    values = {"rounding": max(row["reference_rounding"] for row in rows)}
+    yield Table("Irradiance from spherical harmonics", rows=plain, values=values)
+    windowed = [row | {"mean_error_paper": None} for row in rows if row["window"] != "none"]
+    yield Table("The same under windows", rows=windowed)
 
 
 def _draw(path, environment, reference, shots, exposure, view: View) -> None:

@@ -36,41 +36,48 @@ class Column:
 class Table:
     """A table of all recorded rows, or of `rows`, and a paragraph below it.
 
-    That is `note`, or else what stands under the table's title in the Markdown file beside the
-    experiment, its ``{placeholders}`` filled from the config and from `values`.
+    Columns and paragraph that are not given here are those under the table's title in the Markdown
+    file beside the experiment: a list ``- key | heading | digits | paper``, and text whose
+    ``{placeholders}`` are filled from the config and from `values`.
     """
 
     title: str
-    columns: Sequence[Column]
+    columns: Sequence[Column] = ()
     rows: Sequence[Row] | None = None
     note: str = ""
     values: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
 
-def with_notes(tables: Iterable[Table], path: Path, config: Any) -> list[Table]:
-    """Give each table without a note the paragraph of its title in the Markdown file at `path`.
+def completed(tables: Iterable[Table], path: Path, config: Any) -> list[Table]:
+    """Give each table what its section of the Markdown file at `path` says of it.
 
-    A placeholder may also name a paragraph of ``notes.md`` in the same folder.
+    A placeholder may also name a section of ``notes.md`` in the same folder.
     """
     own, shared = sections(path), sections(path.with_name("notes.md"))
-    filled = []
+    full = []
     for table in tables:
-        note = table.note
-        if not note and table.title in own:
-            values = {"config": config, **table.values}
-            common = {name: text.format(**values) for name, text in shared.items()}
-            note = own[table.title].format(**common | values)
-        filled.append(dataclasses.replace(table, note=note))
-    return filled
+        lines = own.get(table.title, [])
+        columns = [_column(line.removeprefix("- ")) for line in lines if line.startswith("- ")]
+        values = {"config": config, **table.values}
+        note = " ".join(line for line in lines if not line.startswith("- "))
+        used = {name: text for name, text in shared.items() if f"{{{name}}}" in note}
+        common = {name: " ".join(text).format(**values) for name, text in used.items()}
+        note = table.note or note.format(**common | values)
+        full.append(dataclasses.replace(table, columns=table.columns or columns, note=note))
+    return full
 
 
-def sections(path: Path) -> dict[str, str]:
-    """The text under each ``## title`` of a file, as one line; none where there is no file."""
+def sections(path: Path) -> dict[str, list[str]]:
+    """Read the lines under each ``## title`` of a file; none where there is no file."""
     if not path.exists():
         return {}
     _, *parts = re.split(r"^## ", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    halves = (part.partition("\n") for part in parts)
-    return {title.strip(): " ".join(text.split()) for title, _, text in halves}
+    return {title: list(filter(None, lines)) for title, *lines in map(str.splitlines, parts)}
+
+
+def _column(line: str) -> Column:
+    key, heading, digits, paper = (*line.split(" | "), "", "", "")[:4]
+    return Column(key, heading or key, paper or None, int(digits) if digits else None)
 
 
 def write(path: Path, text: str) -> None:
@@ -121,6 +128,8 @@ def to_csv(rows: Sequence[Row]) -> str:
 def to_markdown(table: Table, rows: Sequence[Row]) -> str:
     """The table of `rows`, or of its own."""
     rows = rows if table.rows is None else [plain(row) for row in table.rows]
+    if not table.columns:
+        raise ValueError(f"the table {table.title!r} has no columns")
     known = _keys(rows)
     heads: list[str] = []
     cells: list[list[str]] = [[] for _ in rows]

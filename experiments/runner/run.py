@@ -16,7 +16,7 @@ from .data import Data
 from .errors import UserError
 from .machine import compile_clock, describe
 from .registry import Entry, Experiment
-from .report import Table, to_csv, to_json, to_markdown, with_notes, write
+from .report import Table, completed, to_csv, to_json, to_markdown, write
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Job:
             machine["seconds"] = {"total": total, "compile": compiled, "run": total - compiled}
             machine["times"] = context.times
         tables = [tables] if isinstance(tables, Table) else tables
-        return with_notes(tables, self.entry.path.with_suffix(".md"), self.config)
+        return completed(tables, self.entry.path.with_suffix(".md"), self.config)
 
     def _prepare(self) -> Path:
         partial = self.folder.with_name(f"{self.preset}.partial")

@@ -19,7 +19,6 @@ from jaxtyping import Array, Float
 from jaxsh import harmonics, imaging, sphere, transfer
 
 from ..runner import Column, Context, Table, experiment
-from ..shared.tables import named
 from .bake import OFFSET, Subject, bake, relative_error
 from .pictures import Picture, draw_errors, draw_sheet, draw_variants
 from .reference import Estimate, irradiance
@@ -194,11 +193,7 @@ def _tables(config: FirstLight, context: Context) -> Iterator[Table]:
     yield _times(config, context, bakes)
     yield Table(
         "Meshes",
-        [
-            *named("mesh", "topology"),
-            Column("reported", "what the bake reported"),
-        ],
-        bakes,
+        rows=bakes,
     )
 
 
@@ -214,12 +209,8 @@ def _goals(config: FirstLight, first: dict[str, Any]) -> Table:
             ("shading / reading the coefficients once", None, "shade_to_read"),
         )
     ]
-    columns = [
-        Column("goal", "goal"),
-        Column("limit", "at most", digits=1),
-        Column("measured", "measured", digits=2),
-    ]
-    return Table("Goals", columns, rows, values={"first": first, "degree": max(config.degrees)})
+
+    return Table("Goals", rows=rows, values={"first": first, "degree": max(config.degrees)})
 
 
 def _by_degree(config: FirstLight, errors: list[dict[str, Any]]) -> Table:
@@ -247,18 +238,10 @@ def _worth(config: FirstLight, errors: list[dict[str, Any]]) -> Table:
             line = rows.setdefault(key, dict(zip(("mesh", "environment"), key, strict=True)))
             line[f"{row['variant']} to shadowed"] = row["error_to_shadowed"]
             line[f"{row['variant']} to one bounce"] = row["error_to_one_bounce"]
-    columns = [
-        *named("mesh", "environment"),
-        Column("unshadowed to shadowed", "unshadowed against shadowed, %", digits=1),
-        Column("shadowed to shadowed", "shadowed against shadowed, %", digits=1),
-        Column("unshadowed to one bounce", "unshadowed against one bounce, %", digits=1),
-        Column("shadowed to one bounce", "shadowed against one bounce, %", digits=1),
-        Column("one bounce to one bounce", "one bounce against one bounce, %", digits=1),
-    ]
+
     return Table(
         "What shadows and a bounce are worth",
-        columns,
-        list(rows.values()),
+        rows=list(rows.values()),
         values={"degree": max(config.degrees)},
     )
 
@@ -274,24 +257,10 @@ def _times(config: FirstLight, context: Context, bakes: list[dict[str, Any]]) ->
     projections = [
         times["run_seconds"] for name, times in context.times.items() if name.startswith("project ")
     ]
-    columns = [
-        Column("mesh", "mesh"),
-        Column("rays", "rays of the bake, millions", digits=1),
-        Column("rays_seconds", "rays alone, s", digits=2),
-        Column("bake_seconds", "bake, s", digits=2),
-        Column("bake_to_rays", "bake / rays", digits=2),
-        Column("bake_to_rays_cpu", "the same in CPU time", digits=2),
-        Column("bounced_bake_seconds", "bake with a bounce, s", digits=2),
-        Column("peak_megabytes", "peak memory so far, MB", digits=0),
-        Column("shade_ms", "shade, ms", digits=2),
-        Column("read_ms", "read, ms", digits=2),
-        Column("raster", "raster, s", digits=2),
-        Column("reference", "reference, s", digits=1),
-    ]
+
     return Table(
         "Times",
-        columns,
-        rows,
+        rows=rows,
         values={
             "degree": max(config.degrees),
             "projecting_ms": 1000.0 * statistics.median(projections),

@@ -63,9 +63,9 @@ def test_notes_belong_to_tables_and_name_fields_of_the_config():
     for entry in entries().values():
         notes = sections(entry.path.with_suffix(".md"))
         code = "".join(path.read_text() for path in entry.path.parent.glob("*.py"))
-        for title, text in notes.items():
+        for title, lines in notes.items():
             assert f'"{title}"' in code or f"'{title}'" in code, (entry.file, title)
-            for _, field, _, _ in string.Formatter().parse(text):
+            for _, field, _, _ in string.Formatter().parse(" ".join(lines)):
                 if (field or "").startswith("config."):
                     name = field.removeprefix("config.").partition("[")[0]
                     fields = {one.name for one in dataclasses.fields(load(entry).config)}
