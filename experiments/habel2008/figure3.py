@@ -33,7 +33,8 @@ from .suns import (
     scaled,
 )
 
-_READINGS: tuple[sky.Reading, ...] = get_args(sky.Reading)
+Reading = Literal["luminance", "channel", "harmonics", "range"]
+_READINGS: tuple[Reading, ...] = get_args(Reading)
 _STORED_BANDS = 7  # of the paper's tables and of those that the package comes with
 
 
@@ -86,7 +87,7 @@ def figure3(config: Figure3, context: Context) -> list[Table]:
     return list(_tables(config, context.rows))
 
 
-def smallest(suns: Suns, reading: sky.Reading) -> Float[np.ndarray, "h t 3"]:
+def smallest(suns: Suns, reading: Reading) -> Float[np.ndarray, "h t 3"]:
     """L_min, infinite for channels that turn negative somewhere: they cannot be divided by it."""
     low = np.asarray(sky.smallest_luminance(suns.directions, suns.turbidity[None], reading=reading))
     return np.where((low > 0).all(axis=(0, 1)), low, np.inf)

@@ -1,8 +1,8 @@
-"""The sky: radiance of daylight, its exact projection, and fits of it (Habel et al. 2008)."""
+"""Sky light: radiance of daylight, its exact projection, and fits of it (Habel et al. 2008)."""
 
 from ._cie import cie_radiance
 from ._color import xyz_to_srgb
-from ._error import FitError, Reading, fit_error, smallest_luminance
+from ._error import FitError, fit_error, smallest_luminance
 from ._fit import fit
 from ._ground import horizontal_irradiance, with_ground
 from ._habel import c_header, habel2008_evaluate, habel2008_fit, habel2008_monomials
@@ -20,7 +20,6 @@ __all__ = [
     "Axis",
     "FitError",
     "PreethamConstants",
-    "Reading",
     "SkyFit",
     "SkyWarning",
     "Solution",

@@ -15,7 +15,7 @@ from ..harmonics import degrees, orders
 
 
 class Angles(NamedTuple):
-    """θ of view and sun from +z, γ between the two; shapes broadcast."""
+    """Angles θ of view and sun from +z and γ between the two; shapes broadcast."""
 
     cos_view: Float[Array, "..."]
     cos_sun: Float[Array, "..."]
@@ -25,7 +25,7 @@ class Angles(NamedTuple):
 
 
 def angles(view: Float[Array, "*views 3"], sun: Float[Array, "*suns 3"]) -> Angles:
-    """Of vectors of any nonzero length.
+    """Angles between vectors of any nonzero length, and their cosines.
 
     Both angles come from atan2, right to the last digits near 0 and π where acos is not. As
     functions of direction they have cone points, θ of the sun at the zenith and γ at the sun and
@@ -40,7 +40,7 @@ def angles(view: Float[Array, "*views 3"], sun: Float[Array, "*suns 3"]) -> Angl
 
 
 def directions(value: Float[ArrayLike, "*batch 3"], name: str) -> Float[Array, "*batch 3"]:
-    """As a floating-point array, or a `ValueError` that says which input has the wrong shape."""
+    """Converts to floating point; raises `ValueError` that names an input of wrong shape."""
     array = as_float(value)
     if array.ndim == 0 or array.shape[-1] != 3:
         raise ValueError(f"expected {name} (..., 3) with x, y, z last, got shape {array.shape}")
@@ -48,7 +48,7 @@ def directions(value: Float[ArrayLike, "*batch 3"], name: str) -> Float[Array, "
 
 
 def parameter(value: Float[ArrayLike, "*batch"], dtype) -> Float[Array, "*batch"]:
-    """A model's number, one per sun, in the directions' dtype."""
+    """Converts a model's number, one per sun, to the directions' dtype."""
     return as_float(value).astype(dtype)
 
 
@@ -59,7 +59,7 @@ def each_sun(
     size: int,
     most: int,
 ) -> Any:
-    """`function(sun, *numbers)` for each sun (3,) of a batch, with a scalar of each number.
+    """Calls `function(sun, *numbers)` for each sun (3,) of a batch, with a scalar of each number.
 
     Suns (..., 3) and numbers (...) broadcast. On the CPU `size` suns at a time, on an accelerator
     at most `most` of them.
@@ -77,7 +77,7 @@ def each_sun(
 def over_one_axis(
     function: Callable[..., Any], sun: Float[Array, "*suns 3"], *numbers: Float[Array, "..."]
 ) -> Any:
-    """`function(suns, *numbers)`, which takes one axis (n, 3) and (n,), for those of any batch."""
+    """Calls `function(suns, *numbers)`, which takes one axis (n, 3) and (n,), on a batch."""
     batch = jnp.broadcast_shapes(sun.shape[:-1], *(n.shape for n in numbers))
 
     def whole(*arrays):
@@ -97,7 +97,7 @@ def over_one_axis(
 
 
 def widened(shape: tuple[int, ...], array: Float[Array, "..."]) -> Float[Array, "..."]:
-    """Broadcast to a shape of the same or a higher rank."""
+    """Broadcasts to a shape of the same or a higher rank."""
     missing = len(shape) - array.ndim
     return jnp.broadcast_to(array.reshape((1,) * missing + array.shape), shape)
 
@@ -108,7 +108,7 @@ def unit(vector: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3"]:
 
 
 def length(*components: Float[Array, "..."]) -> Float[Array, "..."]:
-    """√Σ c², zero with derivative zero where all are."""
+    """√Σ c²; zero, with derivative zero, where all components are zero."""
     squared = sum(c * c for c in components)
     positive = squared > 0
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1)), 0)
@@ -117,14 +117,14 @@ def length(*components: Float[Array, "..."]) -> Float[Array, "..."]:
 def zenith_angle(
     x: Float[Array, " n"], y: Float[Array, " n"], z: Float[Array, " n"]
 ) -> Float[Array, " n"]:
-    """θ of a unit vector. A cone point at the zenith, where the derivative is set to zero."""
+    """Angle θ of a unit vector: a cone point at the zenith, where the derivative is set to zero."""
     return jnp.atan2(length(x, y), z)
 
 
 def squared_zenith_angle(
     x: Float[Array, " n"], y: Float[Array, " n"], z: Float[Array, " n"]
 ) -> Float[Array, " n"]:
-    """θ² of a unit vector: smooth at the zenith, where θ is not."""
+    """Square θ² of the angle of a unit vector: smooth at the zenith, where θ is not."""
     squared = x * x + y * y
     near = (squared < 1e-5) & (z > 0)
     # arcsin² r; the first term left out, 4r⁸/35, is below float64's rounding here.
@@ -136,7 +136,7 @@ def squared_zenith_angle(
 def waves(
     x: Float[Array, " n"], y: Float[Array, " n"], degree: int, *, smooth: bool
 ) -> Float[Array, "k n"]:
-    """What turns coefficients from azimuth 0 to the sun's: cos mφ for m ≥ 0, sin |m|φ for m < 0.
+    """Factors that turn coefficients from azimuth 0 to the sun's: cos mφ for m ≥ 0, else sin |m|φ.
 
     Habel et al. 2008, eq. 4, for a sky that is its own mirror image in the sun's meridian, so
     that all weights with m < 0 are zero at azimuth 0. `smooth` leaves the factor sin^|m| θ in:
@@ -163,6 +163,6 @@ def half_rows(degree: int) -> np.ndarray:
 
 
 def row_of_each(degree: int) -> np.ndarray:
-    """For each of the K coefficients the place of (l, |m|) among `half_rows`."""
+    """Places of (l, |m|) among `half_rows`, one for each of the K coefficients."""
     l, m = degrees(degree), orders(degree)
     return l * (l + 1) // 2 + np.abs(m)

@@ -1,4 +1,4 @@
-"""The fifteen standard skies of CIE S 011 / ISO 15469:2004, from overcast to clear and turbid."""
+"""Fifteen standard skies of CIE S 011 / ISO 15469:2004, from overcast to clear and turbid."""
 
 import math
 import operator
@@ -53,9 +53,18 @@ def cie_radiance(
       sky, 13 the polluted, 15 the white-blue turbid.
     - `check`: a sun below the horizon raises, warns or is allowed.
 
-    **Returns** (..., 3) linear sRGB of the white point, for a standard without colour: three
+    **Returns** (..., 3) linear sRGB of the white point, since the standard has no color: three
     equal channels, whose luminance is that of the sky; zero below the horizon. Kinks as for
-    `preetham_radiance`.
+    `preetham_radiance`. Raises `ValueError` for an unknown kind, and as `check` says.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> zenith, sun = np.array([0.0, 0.0, 1.0]), np.array([0.6, 0.0, 0.8])
+    >>> luminance = sky.cie_radiance(zenith, sun, 5.0, kind=12)
+    >>> [round(float(channel), 3) for channel in luminance]
+    [5.0, 5.0, 5.0]
     """
     row = _coefficients(kind)
     check_option(check)

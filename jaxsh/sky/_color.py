@@ -1,4 +1,4 @@
-"""From a sky's chromaticity and luminance to XYZ and linear sRGB."""
+"""Conversion of a sky's chromaticity and luminance to XYZ and linear sRGB."""
 
 from typing import Literal, get_args
 
@@ -17,9 +17,18 @@ _WHITE = np.array([0.3127, 0.3290])
 
 @read_only_cache(maxsize=None)
 def xyz_to_srgb() -> Float[np.ndarray, "3 3"]:
-    """Matrix from XYZ to linear sRGB, derived from primaries and white in full precision.
+    """Matrix (3, 3) from XYZ to linear sRGB, derived from primaries and white in full precision.
 
-    White has Y = 1: the three primaries add up to it.
+    Primaries and white point (0.3127, 0.3290) of ITU-R BT.709; white has Y = 1, so that the three
+    primaries add up to it. On the host, in float64 and read-only.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> white = np.array([0.3127 / 0.3290, 1.0, 0.3583 / 0.3290])
+    >>> np.round(sky.xyz_to_srgb() @ white, 6).tolist()
+    [1.0, 1.0, 1.0]
     """
     primaries, white = _xyz_at_unit_sum(_PRIMARIES), _xyz_at_unit_sum(_WHITE) / _WHITE[1]
     return np.linalg.inv(primaries.T * np.linalg.solve(primaries.T, white))
@@ -31,7 +40,7 @@ def from_xyy(
     luminance: Float[Array, "*batch"],
     space: Space,
 ) -> Float[Array, "*batch 3"]:
-    """Colour of given chromaticity and luminance in a named space; nothing is clamped."""
+    """Color of given chromaticity and luminance in a named space; nothing is clamped."""
     if space == "xyY":
         return jnp.stack([x, y, luminance], axis=-1)
     scale = luminance / y

@@ -1,4 +1,4 @@
-"""The paper's measure of error, and the readings of the intensity that it is relative to."""
+"""Error measure of Habel et al. 2008, and readings of the intensity that it is relative to."""
 
 import functools
 from typing import Literal, NamedTuple, get_args
@@ -23,7 +23,18 @@ _RINGS, _SPOKES = 61, 120
 
 
 class FitError(NamedTuple):
-    """Relative upper bounds, one per channel; times 100 for per cent."""
+    """Upper bounds of a fit's error relative to L_min, one per channel; times 100 for percent.
+
+    `mean` is E_mean, eq. 3 of Habel et al. 2008, `max` is E_max, eq. 2. Made by `fit_error`.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> error = sky.fit_error(np.zeros((3, 4)), np.ones((3, 4)), 1.0)
+    >>> [round(float(bound[0]), 3) for bound in (error.mean, error.max)]
+    [2.0, 4.0]
+    """
 
     mean: Float[Array, "*batch"]
     max: Float[Array, "*batch"]
@@ -34,10 +45,21 @@ def fit_error(
     exact: Float[ArrayLike, "*batch k"],
     smallest: Float[ArrayLike, "*lows"],
 ) -> FitError:
-    """E_mean and E_max of Habel et al. 2008, eqs. 3 and 2: (...), one for each channel.
+    """Errors E_mean and E_max of Habel et al. 2008, eqs. 3 and 2: (...), one for each channel.
 
     The 2-norm and the 1-norm of the coefficients' error over L_min, `smallest`, which broadcasts
-    against the leading axes. For fewer bands pass fewer coefficients.
+    against the leading axes. For fewer bands pass fewer coefficients. Differentiable, but for the
+    2-norm where the error is zero.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> sun = np.array([0.6, 0.0, 0.8])
+    >>> fitted, exact = sky.preetham_harmonics(sun, 3.0, 2), sky.project_preetham(sun, 3.0, 2)
+    >>> error = sky.fit_error(fitted, exact, sky.smallest_luminance(sun, 3.0))
+    >>> bool(100 * error.mean.max() < 0.005)
+    True
     """
     difference = jnp.subtract(*align(as_float(approximate), as_float(exact)))
     low = as_float(smallest)
@@ -52,7 +74,9 @@ def smallest_luminance(
     reading: Reading = "luminance",
     degree: int = 6,
 ) -> Float[Array, "*out 3"]:
-    """L_min of Preetham's sky, which the paper leaves undefined, for each linear sRGB channel.
+    """Smallest intensity L_min of Preetham's sky, for each linear sRGB channel: (..., 3), kcd/m².
+
+    Habel et al. 2008 divide by it in eqs. 2 and 3 and leave it undefined. `reading` is one of:
 
     - `"luminance"`: the smallest luminance of the sky's hemisphere at that sun and turbidity,
       the same for all channels. With it the paper's claims come out as measured.
@@ -63,7 +87,14 @@ def smallest_luminance(
     - `"range"`: the smallest of `"luminance"` over all suns and turbidities given.
 
     On a grid of 1.5 by 3 degrees from zenith to horizon: up to 1e-3 above the true minimum. Not
-    for derivatives.
+    for derivatives. Batches of sun and turbidity broadcast; `degree` is that of the third reading.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> sky.smallest_luminance(np.array([0.6, 0.0, 0.8]), 3.0).shape
+    (3,)
     """
     if reading not in get_args(Reading):
         raise ValueError(f"reading must be one of {', '.join(get_args(Reading))}, got {reading!r}")
@@ -94,7 +125,7 @@ def _smallest(sun, turbidity, reading: Reading, degree: int):
 
 @read_only_cache(maxsize=None)
 def _hemisphere() -> Float[np.ndarray, "n 3"]:
-    """From the zenith to the horizon itself, both included."""
+    """Views from the zenith to the horizon itself, both included."""
     theta = np.linspace(0, np.pi / 2, _RINGS)[:, None]
     phi = 2 * np.pi * np.arange(_SPOKES) / _SPOKES
     z = np.broadcast_to(np.maximum(np.cos(theta), 0), (_RINGS, _SPOKES))

@@ -36,14 +36,14 @@ def fit(
     max_steps: int = 256,
     throw: bool = True,
 ) -> SkyFit:
-    """A sky's coefficients, fitted as functions of the sun and the sky's parameters.
+    """Fits a sky's coefficients as functions of the sun and the sky's parameters.
 
     **Arguments**
 
     - `model`: `model(view, sun, *parameters) -> (n, C)` as for `sky.project`. It must turn with
       the sun and be its own mirror image in the plane of sun and zenith.
     - `parameters`: the name of each further argument, in order, and its range: any number of
-      them, turbidity, albedo, a colour of the ground.
+      them, turbidity, albedo, a color of the ground.
     - `terms`: how many Chebyshev polynomials in the sun's height and in each parameter; 12 and 6.
     - `log`: parameters that are fitted in their logarithm.
     - `zenith`: the largest angle between sun and zenith, in radians.
@@ -65,6 +65,16 @@ def fit(
     In JAX's default float type: fit with x64 on, and evaluate in any. Runs on the host's values
     and not inside `jit`. Raises `ValueError` for wrong ranges, counts and names, for coefficients
     that are not finite, and for a sky that does not turn with the sun or has no mirror symmetry.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> def glow(view, sun, haze):
+    ...     return haze * (1 + view @ sun)[:, None]
+    >>> fitted = sky.fit(glow, {"haze": (1.0, 2.0)}, degree=1, terms=(4, 2), solver="qr")
+    >>> fitted(np.array([0.6, 0.0, 0.8]), 1.5).shape
+    (1, 4)
     """
     axes = _axes(parameters, log, zenith, parity)
     terms = _counts("terms", terms, [12, *[6] * len(parameters)])
@@ -103,7 +113,7 @@ def fit(
 
 
 def _reweighted(solve, mix, weights, rounds: int) -> tuple[Float[Array, "..."], Solution]:
-    """Lawson's algorithm: of all rounds the one whose worst error on the samples is least."""
+    """Lawson's algorithm: the round whose worst error on the samples is least."""
     emphasis, best, least = jnp.ones_like(weights), None, np.inf
     for _ in range(rounds + 1):
         values, solution, errors = solve(weights * jnp.sqrt(emphasis))
@@ -150,7 +160,7 @@ def _counts(name: str, counts, default: list[int]) -> tuple[int, ...]:
 
 
 def _check_symmetry(model: Model, suns, numbers) -> None:
-    """Radiance around one sun in the middle of the range, turned and mirrored."""
+    """Compares radiance around a sun in the middle of the range with itself turned and mirrored."""
     middle = len(suns) // 2
     sun, parameters = suns[middle], [n[middle] for n in numbers]
     rng = np.random.default_rng(0)

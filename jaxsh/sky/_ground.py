@@ -1,4 +1,4 @@
-"""A ground below the sky: the lower hemisphere as a diffuse surface lit from above."""
+"""Ground below the sky: the lower hemisphere as a diffuse surface lit from above."""
 
 import math
 
@@ -16,7 +16,16 @@ def horizontal_irradiance(
     """Irradiance of level ground, with its factor π, by a light from above alone.
 
     Exact at any degree from 1 on, not only in the limit: where there is no light below the
-    horizon, the clamped cosine may be replaced by cos θ, and E = √(4π/3) c_10.
+    horizon, the clamped cosine may be replaced by cos θ, and E = √(4π/3) c_10. Takes (..., K),
+    gives (...) in the light's unit times sr. Linear. Raises `ValueError` for degree 0.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> light = sky.preetham_harmonics(np.array([0.6, 0.0, 0.8]), 3.0, 1)
+    >>> sky.horizontal_irradiance(light).shape
+    (3,)
     """
     coefficients = as_float(coefficients)
     if degree_of(coefficients.shape[-1] if coefficients.ndim else 0) < 1:
@@ -27,7 +36,7 @@ def horizontal_irradiance(
 def with_ground(
     light: Float[ArrayLike, "*batch c k"], albedo: Float[ArrayLike, "*albedos"]
 ) -> Float[Array, "*out c k"]:
-    """A light from above and, below the horizon, diffuse ground that it lights: (..., C, K).
+    """Adds diffuse ground below the horizon to the light from above that lights it: (..., C, K).
 
     The lower hemisphere gets the constant radiance albedo/π · E, with E the light's own
     `horizontal_irradiance`, and its coefficients in closed form. It lessens the jump at the
@@ -37,6 +46,14 @@ def with_ground(
     `albedo` is a number, one per channel (C,), or (..., C) in batches that broadcast with those
     of the light. Bilinear, differentiable in both. Raises `ValueError` for an albedo whose value
     is known and outside of [0, 1], and for a light of degree 0.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> light = sky.preetham_harmonics(np.array([0.6, 0.0, 0.8]), 3.0, 1)
+    >>> sky.with_ground(light, np.array([0.3, 0.2, 0.1])).shape
+    (3, 4)
     """
     light = as_float(light)
     irradiance = horizontal_irradiance(light)

@@ -1,4 +1,4 @@
-"""The paper's own fit: plain polynomials in θ and τ (Habel et al. 2008, eq. 1)."""
+"""Plain polynomials in θ and τ, the paper's own fit (Habel et al. 2008, eq. 1), and its export."""
 
 import functools
 import math
@@ -21,7 +21,7 @@ def habel2008_fit(
     constants: Constants = "paper",
     **options,
 ) -> SkyFit:
-    """Habel et al. 2008: each weight a polynomial in θ and τ of degree (13, 7), for 7 bands.
+    """Fits each weight by a polynomial in θ and τ of degree (13, 7), as Habel et al. 2008 do.
 
     The same polynomials as the paper's, found in Chebyshev polynomials of θ and τ: in the
     monomials of eq. 1 no solver reaches them (condition number 4e19). `habel2008_monomials`
@@ -30,7 +30,14 @@ def habel2008_fit(
     Not smooth where the sun passes the zenith: weights with m ≠ 0 are small there but not zero,
     and take the azimuth 0. Worst E_mean over the range: 0.28 % at 5 bands and 0.31 % at 7;
     Lawson's rounds with 1/L_min as `weight` end there too, so no polynomial of this degree does
-    much better. The paper says less than 0.005 % and 1.5 %.
+    much better. The paper says less than 0.005 % and 1.5 %. `preetham_fit` is smooth there.
+
+    **Example**
+
+    >>> from jaxsh import sky
+    >>> fitted = sky.habel2008_fit((4, 3), degree=1, solver="qr")
+    >>> sky.habel2008_monomials(fitted).shape
+    (4, 4, 3, 3)
     """
     return fit(
         _model(constants),
@@ -43,7 +50,7 @@ def habel2008_fit(
 
 
 def habel2008_monomials(fit: SkyFit) -> Float[np.ndarray, "k i j channels"]:
-    """The coefficients p of eq. 1, c_lm = Σ_ij p_lm,ij θ^i τ^j, as the authors publish theirs.
+    """Converts a fit to the coefficients p of eq. 1, c_lm = Σ_ij p_lm,ij θ^i τ^j, as published.
 
     (K, terms in θ, terms in τ, channels) in NumPy float64, zero for m < 0. The conversion from
     Chebyshev coefficients is done in exact integers and rounded once. The sum itself cancels
@@ -51,6 +58,14 @@ def habel2008_monomials(fit: SkyFit) -> Float[np.ndarray, "k i j channels"]:
     float32.
 
     Raises `ValueError` for a fit with parity, prefactor or logarithms, which is no polynomial.
+
+    **Example**
+
+    >>> from jaxsh import sky
+    >>> fitted = sky.habel2008_fit((4, 3), degree=1, solver="qr")
+    >>> table = sky.habel2008_monomials(fitted)
+    >>> table.shape, bool((table[1] == 0).all())
+    ((4, 4, 3, 3), True)
     """
     if fit.parity or fit.prefactor is not None or any(axis.log for axis in fit.axes):
         raise ValueError("only a plain fit in θ and τ is a polynomial: see habel2008_fit")
@@ -74,7 +89,20 @@ def habel2008_evaluate(
     theta: Float[np.ndarray, " n"],
     turbidity: Float[np.ndarray, " n"],
 ) -> Float[np.ndarray, "n channels k"]:
-    """Eq. 1 as the paper has it, in NumPy and in the table's dtype: suns at azimuth 0."""
+    """Evaluates eq. 1 of Habel et al. 2008 as printed, for suns at azimuth 0: (n, channels, K).
+
+    `table`: as `habel2008_monomials` gives it or the authors publish theirs; `theta` (n,): the
+    sun's angle from the zenith; `turbidity` (n,). In NumPy on the host, in the table's dtype: at
+    degree (13, 7) the sum keeps seven digits in float64 and none in float32.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> table = sky.habel2008_monomials(sky.habel2008_fit((4, 3), degree=1, solver="qr"))
+    >>> sky.habel2008_evaluate(table, np.array([0.2, 0.9]), np.array([3.0, 4.0])).shape
+    (2, 3, 4)
+    """
     powers = (
         np.power.outer(np.asarray(x, table.dtype), np.arange(count, dtype=table.dtype))
         for x, count in zip((theta, turbidity), table.shape[1:3], strict=True)
@@ -150,10 +178,17 @@ static void {prefix}(double theta, double phi, double {name},
 
 
 def c_header(fit: SkyFit, prefix: str = "sky_harmonics") -> str:
-    """A C89 header with the fit's monomials and `prefix(theta, phi, parameter, coefficients)`.
+    """Writes a C89 header: the fit's monomials, `prefix(theta, phi, parameter, coefficients)`.
 
     For a fit that `habel2008_monomials` takes, `habel2008_fit` first of all; in doubles, by
-    Horner's rule.
+    Horner's rule. Raises `ValueError` for a prefix that is no name in C.
+
+    **Example**
+
+    >>> from jaxsh import sky
+    >>> header = sky.c_header(sky.habel2008_fit((4, 3), degree=1, solver="qr"), "my_sky")
+    >>> "static void my_sky(double theta, double phi, double turbidity," in header
+    True
     """
     if not (prefix.isidentifier() and prefix.isascii()):
         raise ValueError(f"prefix must be a name in C, got {prefix!r}")

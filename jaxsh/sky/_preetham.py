@@ -1,4 +1,4 @@
-"""The analytic daylight model of Preetham, Shirley and Smits 1999: radiance of the sky."""
+"""Radiance of the sky by the analytic daylight model of Preetham, Shirley and Smits 1999."""
 
 import functools
 from typing import Literal, NamedTuple, get_args
@@ -18,6 +18,19 @@ Matrix = tuple[tuple[float, float, float, float], ...]  # rows τ², τ, 1; colu
 
 
 class PreethamConstants(NamedTuple):
+    """Constants of appendix A.2 of Preetham et al. 1999, as nested tuples of numbers.
+
+    `luminance`, `x`, `y`: A to E of F(θ, γ), each a slope and an intercept in turbidity;
+    `zenith_x`, `zenith_y`: rows for τ², τ, 1 and columns for θ³, θ², θ, 1. See
+    `preetham_constants`.
+
+    **Example**
+
+    >>> from jaxsh import sky
+    >>> sky.preetham_constants("paper").luminance[0]  # A = 0.1787 τ - 1.4630
+    (0.1787, -1.463)
+    """
+
     luminance: Coefficients
     x: Coefficients
     y: Coefficients
@@ -95,6 +108,17 @@ _CODE = PreethamConstants(
 
 
 def preetham_constants(name: str) -> PreethamConstants:
+    """Looks up the constants of Preetham et al. 1999, appendix A.2.
+
+    `"paper"` are the printed ones, `"code"` the set with five decimals that many programs share.
+    Raises `ValueError` for any other name.
+
+    **Example**
+
+    >>> from jaxsh import sky
+    >>> [sky.preetham_constants(name).zenith_x[2][3] for name in ("paper", "code")]
+    [0.25886, 0.25885]
+    """
     if name not in get_args(Constants):
         raise ValueError(f"constants must be one of {', '.join(get_args(Constants))}, got {name!r}")
     return _PAPER if name == "paper" else _CODE
@@ -133,6 +157,16 @@ def preetham_radiance(
     Derivatives are finite everywhere. Kinks: the cone of exp(Dγ) at the sun and the antisolar
     point, and that of the zenith values where the sun stands in the zenith (the derivative along
     a cone's axis is set to zero); the step at the horizon (that of the sky above is given).
+    Raises `ValueError` for shapes that do not broadcast and options that there are not.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> views = np.array([[0.0, 0.0, 1.0], [0.0, 0.6, -0.8]])  # up, and below the horizon
+    >>> radiance = sky.preetham_radiance(views, np.array([0.6, 0.0, 0.8]), 3.0)
+    >>> radiance.shape, bool((radiance[1] == 0).all())
+    ((2, 3), True)
     """
     preetham_constants(constants)
     check_space(space)
@@ -149,7 +183,7 @@ def preetham_radiance(
 
 @functools.partial(jax.jit, static_argnames=("constants", "space"))
 def _radiance(view, sun, turbidity, constants: Constants, space: Space):
-    """Colour and, for the check, luminance."""
+    """Color and, for the check, luminance."""
     table = preetham_constants(constants)
     turbidity, view, sun = align(turbidity[..., None], view, sun)
     geometry, turbidity = angles(view, sun), turbidity[..., 0]
@@ -169,13 +203,13 @@ def _radiance(view, sun, turbidity, constants: Constants, space: Space):
 def zenith_luminance(
     theta_sun: Float[Array, "..."], turbidity: Float[Array, "..."]
 ) -> Float[Array, "..."]:
-    """Y_z in kcd/m² (appendix A.2)."""
+    """Luminance Y_z of the zenith in kcd/m² (appendix A.2)."""
     chi = (4 / 9 - turbidity / 120) * (jnp.pi - 2 * theta_sun)
     return (4.0453 * turbidity - 4.9710) * jnp.tan(chi) - 0.2155 * turbidity + 2.4192
 
 
 def zenith_value(matrix: Matrix, theta_sun, turbidity):
-    """x_z or y_z: (τ², τ, 1) · M · (θ³, θ², θ, 1)ᵀ."""
+    """Chromaticity x_z or y_z of the zenith: (τ², τ, 1) · M · (θ³, θ², θ, 1)ᵀ."""
     quadratic, linear, constant = (
         ((row[0] * theta_sun + row[1]) * theta_sun + row[2]) * theta_sun + row[3] for row in matrix
     )
@@ -183,7 +217,7 @@ def zenith_value(matrix: Matrix, theta_sun, turbidity):
 
 
 def _relative(coefficients: Coefficients, geometry: Angles, turbidity):
-    """F(θ, γ) / F(0, θ_s)."""
+    """Ratio F(θ, γ) / F(0, θ_s)."""
     a, b, c, d, e = (slope * turbidity + intercept for slope, intercept in coefficients)
     seen = gradation(a, b, geometry.cos_view)
     seen = seen * indicatrix(c, d, e, geometry.gamma, geometry.cos_gamma)
@@ -192,7 +226,7 @@ def _relative(coefficients: Coefficients, geometry: Angles, turbidity):
 
 
 def gradation(a, b, cos_theta):
-    """1 + a exp(b/cos θ) for b < 0, and its limit 1 from the horizon downwards."""
+    """Gradation 1 + a exp(b/cos θ) for b < 0, and its limit 1 from the horizon downwards."""
     # exp(b/c) is zero in every precision well before c is as small as this, and its derivative
     # b/c² is still finite.
     above = cos_theta > 1e-6

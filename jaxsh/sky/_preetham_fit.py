@@ -51,8 +51,9 @@ def preetham_harmonics(
 ) -> Float[Array, "*out 3 k"]:
     """Coefficients of Preetham's sky without the sun's disc, from a stored fit: (..., 3, K).
 
-    Linear sRGB, kcd/m², the paper's constants. Far cheaper than
-    `project_preetham`, most of all in a batch: one sun's call costs more than its arithmetic.
+    Linear sRGB, kcd/m², the paper's constants (Habel et al. 2008, with a better parametrisation:
+    see `preetham_fit`). Far cheaper than `project_preetham`, most of all in a batch: one sun's
+    call costs more than its arithmetic. The sun's own light is `sun_harmonics`.
 
     **Arguments**
 
@@ -71,6 +72,14 @@ def preetham_harmonics(
     | wide | 14 × 10 | 2 to 10 | 47,040 | 0.0008 % / 0.0010 % in float64 |
 
     Out of range: a `ValueError` where values are known, else NaN.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> sun = np.array([[0.6, 0.0, 0.8], [0.0, 0.8, 0.6]])
+    >>> sky.preetham_harmonics(sun, 3.0, degree=4, window="habel").shape
+    (2, 3, 25)
     """
     sun = directions(sun, "sun")
     turbidity = parameter(turbidity, sun.dtype)
@@ -86,7 +95,7 @@ def preetham_harmonics(
 
 @functools.partial(jax.jit, static_argnames=("degree", "window", "table"))
 def _harmonics(sun, turbidity, degree: int, window: Window | None, table: Table):
-    """The table is a constant of the compiled program, on whatever device that runs."""
+    # The table is a constant of the compiled program, on whatever device that runs.
     coefficients = evaluate(preetham_table(table, degree), sun, (turbidity,))
     if window is None:
         return coefficients
@@ -95,7 +104,18 @@ def _harmonics(sun, turbidity, degree: int, window: Window | None, table: Table)
 
 
 def preetham_table(table: Table, degree: int = 6) -> SkyFit:
-    """A stored fit, read when it is first used: see `preetham_harmonics`."""
+    """Reads one of the stored fits behind `preetham_harmonics`, up to `degree` (at most 6).
+
+    `table`: `"small"`, `"precise"` or `"wide"`. Coefficients are in JAX's default float or the
+    table's own, whichever is shorter. Made by `tools/make_sky_table.py`.
+
+    **Example**
+
+    >>> from jaxsh import sky
+    >>> stored = sky.preetham_table("small")
+    >>> stored.degree, stored.coefficients.shape, stored.axes[1].name
+    (6, (3, 28, 12, 6), 'turbidity')
+    """
     axes = stored_axes(table)
     coefficients, _ = _stored()[table]
     return SkyFit(jnp.asarray(coefficients), jnp.asarray(MIX), axes, True, prefactor).truncated(
@@ -120,7 +140,7 @@ def _stored() -> dict[str, tuple[np.ndarray, tuple[float, float]]]:
 
 
 def prefactor(sun: Float[Array, "n 3"], turbidity: Float[Array, " n"]) -> Float[Array, "n 3"]:
-    """What X, Y and W are divided by before the fit: p_Y p_x / p_y, p_Y and p_Y / p_y.
+    """Divisors of X, Y and W before the fit: p_Y p_x / p_y, p_Y and p_Y / p_y.
 
     p_q = q_z(θ, τ) / F_q(0, θ) is all of the model that is not smooth where the sun passes the
     zenith, and nearly vanishes at τ ≈ 2, where the rest does not.
@@ -147,10 +167,18 @@ def preetham_fit(
     lawson: int = 0,
     **options,
 ) -> SkyFit:
-    """The fit behind `preetham_harmonics` with any number of terms, range and degree.
+    """Fits Preetham's sky as `preetham_harmonics` does, with any terms, range and degree.
 
     X, Y and W = X + Y + Z over their `prefactor`, as sin^m θ · T_i(θ²) T_j(log τ), weighted by
     1/L_min. Linear sRGB, kcd/m², the paper's constants. Further options as for `fit`.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> fitted = sky.preetham_fit((4, 3), turbidity=(3.0, 4.0), degree=1, solver="qr")
+    >>> fitted(np.array([0.6, 0.0, 0.8]), 3.5).shape
+    (3, 4)
     """
     return fit(
         _MODEL,
@@ -167,7 +195,7 @@ def preetham_fit(
 
 
 def preetham_axes(low: float, high: float) -> tuple[Axis, ...]:
-    """The variables of a `preetham_fit` for turbidities in [low, high]."""
+    """Variables of a `preetham_fit` for turbidities in [low, high]."""
     return (Axis("θ²", 0.0, math.pi**2 / 4), Axis("turbidity", low, high, log=True))
 
 

@@ -1,4 +1,4 @@
-"""A fitted sky: coefficients as a closed form of the sun and the sky's parameters."""
+"""Fitted skies: coefficients as a closed form of the sun and the sky's parameters."""
 
 import functools
 import math
@@ -28,7 +28,17 @@ Prefactor = Callable[..., Array]
 
 
 class Axis(NamedTuple):
-    """One variable of a fit: its name, its range, and the scale that it is fitted in."""
+    """Variable of a fit: its name, its range, and the scale that it is fitted in.
+
+    `log`: fitted in its logarithm. See `SkyFit.axes`.
+
+    **Example**
+
+    >>> from jaxsh import sky
+    >>> axis = sky.Axis("turbidity", 2.0, 8.0, log=True)
+    >>> axis.nodes(3).round(3).tolist(), bool(axis.holds(9.0))
+    ([2.195, 4.0, 7.291], False)
+    """
 
     name: str
     low: float
@@ -36,20 +46,20 @@ class Axis(NamedTuple):
     log: bool = False
 
     def scaled(self, value: Float[Array, " n"]) -> Float[Array, " n"]:
-        """From the range to [-1, 1]. Differentiable."""
+        """Maps the range to [-1, 1]. Differentiable."""
         low, high = self._ends()
         bent = jnp.log(value) if self.log else value
         return (2 * bent - (low + high)) / (high - low)
 
     def nodes(self, count: int) -> Float[np.ndarray, " n"]:
-        """The roots of T_count in the scaled variable, back in the range, ascending."""
+        """Roots of T_count in the scaled variable, back in the range, ascending."""
         low, high = self._ends()
         root = -np.cos(np.pi * (np.arange(count) + 0.5) / count)
         bent = low + (root + 1) * (high - low) / 2
         return np.exp(bent) if self.log else bent
 
     def holds(self, value):
-        """Whether values are in the range, but for rounding; NumPy or JAX."""
+        """True for values in the range, but for rounding; NumPy or JAX."""
         slack = 1e-6 * (self.high - self.low)
         return (value >= self.low - slack) & (value <= self.high + slack)
 
@@ -58,7 +68,7 @@ class Axis(NamedTuple):
 
 
 class SkyFit(eqx.Module):
-    """A sky's coefficients as Chebyshev series in the sun's height and the sky's parameters.
+    """Coefficients of a sky as Chebyshev series in the sun's height and the sky's parameters.
 
     c_lm = w_m Σ_q mix_q p_q Σ_ij a_qlm,ij T_i(u) T_j(v)…, for m ≥ 0 at azimuth 0; eq. 4 of Habel
     et al. 2008 turns it to the sun. With `parity`, u is θ² scaled to [-1, 1] and w_m = sin^m θ,
@@ -67,8 +77,16 @@ class SkyFit(eqx.Module):
 
     `coefficients` a: (channels, rows, *terms), one row for each (l, m ≥ 0); `mix`: from fitted
     quantities to the sky's channels; `prefactor`: p(sun, *parameters) -> (n, channels), or none;
-    `axes`: the variables and their ranges; `solution`: what the solver says, or none for a
-    stored fit. Made by `fit`.
+    `axes`: the variables and their ranges; `solution`: a `Solution`, or none for a stored fit.
+    Made by `fit`.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> stored = sky.preetham_table("small", degree=2)
+    >>> stored(np.array([0.6, 0.0, 0.8]), 3.0).shape
+    (3, 9)
     """
 
     coefficients: Float[Array, "channels rows ..."]
@@ -81,11 +99,11 @@ class SkyFit(eqx.Module):
     def __call__(
         self, sun: Float[ArrayLike, "*suns 3"], *parameters: Float[ArrayLike, "..."]
     ) -> Float[Array, "*out channels k"]:
-        """Coefficients (..., C, K) for suns (..., 3), of any length, and parameters (...) each.
+        """Evaluates coefficients (..., C, K) for suns (..., 3), of any length, and parameters.
 
-        Batches broadcast; in the sun's dtype. Differentiable in everything; with `parity` and no
-        prefactor that has a kink there, the zenith included, and else with the derivative of the
-        kink's terms set to zero there.
+        A parameter (...) for each of `axes` but the first. Batches broadcast; in the sun's dtype.
+        Differentiable in everything; with `parity` and no prefactor that has a kink there, the
+        zenith included, and else with the derivative of the kink's terms set to zero there.
 
         Outside of the fitted range: a `ValueError` where values are known, else NaN. Nothing is
         extrapolated.
@@ -104,11 +122,11 @@ class SkyFit(eqx.Module):
 
     @property
     def degree(self) -> int:
-        """Of the harmonics: rows = (degree + 1)(degree + 2)/2."""
+        """Degree of the harmonics: rows = (degree + 1)(degree + 2)/2."""
         return (int(np.sqrt(8 * self.coefficients.shape[1] + 1)) - 3) // 2
 
     def truncated(self, degree: int) -> "SkyFit":
-        """The same for a lower degree: its bands and no work for others."""
+        """Leaves out the bands above `degree`, and the work for them."""
         if not check_degree(degree) <= self.degree:
             raise ValueError(f"the fit is of degree {self.degree}, got degree {degree}")
         rows = (degree + 1) * (degree + 2) // 2
@@ -162,7 +180,7 @@ def _evaluate(fit: SkyFit, suns: Float[Array, "n 3"], *numbers: Float[Array, " n
 
 
 def design(axes, variables, terms) -> Float[Array, "terms n"]:
-    """The tensor Chebyshev basis at given values of the variables: one for all the weights."""
+    """Tensor Chebyshev basis at given values of the variables: one for all the weights."""
     return tensor(
         [
             chebyshev(axis.scaled(value), count)
@@ -172,7 +190,7 @@ def design(axes, variables, terms) -> Float[Array, "terms n"]:
 
 
 def chebyshev(x: Float[Array, " n"], count: int) -> Float[Array, "count n"]:
-    """T_0 to T_(count-1) in rows, by the three-term recursion. Differentiable."""
+    """Chebyshev's T_0 to T_(count-1) in rows, by the three-term recursion. Differentiable."""
     rows = [jnp.ones_like(x), x]
     while len(rows) < count:
         rows.append(2 * x * rows[-1] - rows[-2])
@@ -180,7 +198,7 @@ def chebyshev(x: Float[Array, " n"], count: int) -> Float[Array, "count n"]:
 
 
 def monomials(x: Float[Array, " n"], count: int) -> Float[Array, "count n"]:
-    """1, x, … x^(count-1) in rows: the paper's basis. Differentiable."""
+    """Powers 1, x, … x^(count-1) in rows: the paper's basis. Differentiable."""
     rows = [jnp.ones_like(x)]
     while len(rows) < count:
         rows.append(rows[-1] * x)
@@ -188,7 +206,7 @@ def monomials(x: Float[Array, " n"], count: int) -> Float[Array, "count n"]:
 
 
 def tensor(rows: Sequence[Float[Array, "_ n"]]) -> Float[Array, "terms n"]:
-    """All products of one row of each, the last varying fastest."""
+    """Products of one row of each, the last varying fastest."""
     return functools.reduce(
         lambda a, b: (a[:, None] * b[None]).reshape(len(a) * len(b), a.shape[-1]), rows
     )

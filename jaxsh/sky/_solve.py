@@ -1,4 +1,4 @@
-"""Many linear least-squares problems with one design, by the solvers that nonlinear ones take.
+"""Linear least-squares problems with one design, by the solvers that nonlinear ones take.
 
 Optimistix and lineax are imported where a problem is solved: the stored fits need neither.
 """
@@ -17,10 +17,20 @@ Solver = _Named | Any  # or an `optimistix.AbstractLeastSquaresSolver`
 
 
 class Solution(eqx.Module):
-    """What a solver says of its work.
+    """Report of a solver: how small the residual is, in how many steps, and whether it is done.
 
     `residual` is the weighted residual's norm relative to that of the data, over all problems;
-    `steps` and `result` are those of the problem that took the most steps or failed.
+    `steps` and `result` (an `optimistix.RESULTS`) are those of the problem that took the most steps
+    or failed.
+
+    **Example**
+
+    >>> from jaxsh import sky
+    >>> def glow(view, sun):
+    ...     return (1 + view @ sun)[:, None]
+    >>> solution = sky.fit(glow, {}, degree=1, terms=[4], solver="qr").solution
+    >>> solution.converged, solution.message
+    (True, 'successful')
     """
 
     residual: Float[Array, ""]
@@ -29,7 +39,7 @@ class Solution(eqx.Module):
 
     @property
     def converged(self) -> bool:
-        """Whether the solver says so for every problem."""
+        """True where the solver says so for every problem. Outside of `jit`."""
         import optimistix as optx
 
         return bool(self.result == optx.RESULTS.successful)
@@ -55,6 +65,17 @@ def least_squares(
     `solver` is an Optimistix least-squares solver, or a name: `"gauss-newton"` and
     `"levenberg-marquardt"` with a lineax QR and a tolerance of √ε, or `"qr"`, the linear solution
     in one step, to check the others by. Does not raise where a solver fails: see `Solution`.
+    Raises `ValueError` for a solver that there is not. Runs on the host's values, not inside `jit`.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import sky
+    >>> design = jnp.asarray([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]])
+    >>> targets = jnp.asarray([[1.0, 3.0, 5.0]])
+    >>> values, solution = sky.least_squares(design, targets, jnp.ones((1, 3)), solver="qr")
+    >>> values.round(3).tolist(), solution.converged
+    ([[1.0, 2.0]], True)
     """
     import optimistix as optx
 

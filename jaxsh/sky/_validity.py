@@ -1,4 +1,4 @@
-"""Where a sky model holds, said before it is used beyond."""
+"""Range checks of the sky models: raise, warn or pass."""
 
 import warnings
 from typing import Literal, get_args
@@ -15,7 +15,20 @@ _ROUNDING = 1e-6
 
 
 class SkyWarning(UserWarning):
-    """A sky model used outside of the range that it holds in."""
+    """Warning of a sky model that is used outside of the range it holds in (`check="warn"`).
+
+    **Example**
+
+    >>> import warnings
+    >>> import numpy as np
+    >>> from jaxsh import sky
+    >>> zenith = np.array([0.0, 0.0, 1.0])
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     warnings.simplefilter("always")
+    ...     _ = sky.preetham_radiance(zenith, zenith, 12.0, check="warn")
+    >>> said[0].category is sky.SkyWarning
+    True
+    """
 
 
 def check_turbidity(turbidity: Array, check: Check) -> None:

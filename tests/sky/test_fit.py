@@ -124,13 +124,13 @@ def test_prefactor_mix_and_weight(rng):
 
 @pytest.mark.slow
 def test_any_number_of_parameters(rng):
-    def coloured(view, sun, low, high):
+    def tinted(view, sun, low, high):
         return low + high * (view @ sun)[:, None] ** 2
 
     ranges = {"low": (0.0, 1.0), "high": (1.0, 2.0)}
-    two = sky.fit(coloured, ranges, degree=2, terms=(8, 2, 2), solver="qr")
+    two = sky.fit(tinted, ranges, degree=2, terms=(8, 2, 2), solver="qr")
     sun, low, high = upper_directions(rng, 5), rng.uniform(0, 1, 5), rng.uniform(1, 2, 5)
-    expected = sky.project(coloured, sun, low, high, degree=2, symmetric=True)
+    expected = sky.project(tinted, sun, low, high, degree=2, symmetric=True)
     assert relative_error(two(sun, low, high), expected) < 1e-8
 
 

@@ -8,7 +8,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from second_derivation import cie_ratio, hosek_spectrum, observers_luminance
+from second_derivation import (
+    cie_ratio,
+    hosek_spectrum,
+    hosek_sun_spectrum,
+    observers_luminance,
+)
 from suns import sun_at, upper_directions
 
 from jaxsh import harmonics, sky
@@ -190,6 +195,21 @@ class TestHosek:
             sky.hosek_radiance(sun_at(90.0), sun_at(40.0), 11.0)
         with pytest.raises(ValueError, match=r"albedo must be in \[0, 1\]"):
             sky.hosek_radiance(sun_at(90.0), sun_at(40.0), 3.0, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("turbidity", "elevation", "ratio"), [(6, 5.0, 0.026), (3, 30.0, 0.87), (2, 60.0, 1.11)]
+)
+def test_preethams_sun_beside_hoseks(turbidity, elevation, ratio):
+    """What the docstrings of `sun_radiance` and `hosek_radiance` say of their suns."""
+    try:
+        tensors = read_tensors(_hosek._table_path())
+    except ImportError:
+        pytest.skip("mitsuba is not installed")
+    spectrum = hosek_sun_spectrum(tensors, np.radians(elevation), turbidity)
+    theirs = 0.683 * observers_luminance(np.arange(320, 721, 40), spectrum)
+    ours = sky.sun_radiance(sun_at(elevation), float(turbidity), space="xyz")[1]
+    assert ours / theirs == pytest.approx(ratio, rel=0.02)
 
 
 def test_hosek_says_what_it_needs(monkeypatch):

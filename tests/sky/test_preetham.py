@@ -51,8 +51,8 @@ def test_the_matrix_sends_white_to_ones_and_primaries_to_the_axes():
 
 
 def test_grey_is_grey():
-    grey = from_xyy(jnp.array(0.3127), jnp.array(0.3290), jnp.array(0.18), "srgb")
-    np.testing.assert_allclose(grey, 0.18, 1e-14)
+    gray = from_xyy(jnp.array(0.3127), jnp.array(0.3290), jnp.array(0.18), "srgb")
+    np.testing.assert_allclose(gray, 0.18, 1e-14)
 
 
 def test_the_two_sets_of_constants_differ_by_what_the_notes_say():

@@ -84,7 +84,7 @@ def test_published_illuminances():
     assert 95 < clear[2] * SOLID_ANGLE < 105
     hazy = sky.sun_radiance(sun_at(90.0), np.array([2.0, 4.0, 6.0]), space="xyY")[:, 2]
     assert np.all(np.diff(hazy) < 0)
-    # The colour of direct sunlight: near 5,600 K at noon, and orange and then red at sunset.
+    # The color of direct sunlight: near 5,600 K at noon, and orange and then red at sunset.
     np.testing.assert_allclose(clear[:2], [0.330, 0.340], 0, 0.005)
     low = sky.sun_radiance(sun_at(np.array([30.0, 10.0, 2.0])), 2.5, space="xyY")
     assert np.all(np.diff(low[:, 0]) > 0.04)
