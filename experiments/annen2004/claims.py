@@ -16,7 +16,7 @@ from ..shared.subjects import Subject, load
 from ..shared.tables import named
 from . import irradiance, methods
 from .plots import draw_claims
-from .scenes import cut, three_lights
+from .scenes import three_lights
 
 NONE, FULL, TRILINEAR, HALF, INNER = (
     "k-means, no gradient",
@@ -140,7 +140,7 @@ def _rows(
             yield {"method": method, "samples": count**3, "psnr": trial.psnr(radiance)}
     one = methods.expand(lights, places["k-means 1"], config.degree, 3)
     for order, name in ((2, "second order"), (3, "third order")):
-        radiance = trial.shade(cut(methods.take(one, 0), order))
+        radiance = trial.shade(methods.take(one, 0).truncated(order))
         yield {"method": f"{name}, one sample", "samples": 1, "psnr": trial.psnr(radiance)}
 
 

@@ -16,7 +16,7 @@ from ..runner import Context, Table, experiment
 from ..shared.lights import exact_light
 from ..shared.plots import Panel, View, draw_panels
 from ..shared.subjects import Subject, load
-from .scenes import cut, exact_expansion, psnr, three_lights
+from .scenes import exact_expansion, psnr, three_lights
 
 _WIDTH = 0.8  # of a panel, in its heights
 _SHOWN = "one sample", "with gradient", "second order", "2³ grid, half gradient"
@@ -111,7 +111,7 @@ def _by_cubes(
     corners = midrange.taylor(cubes, config.degree, 1)
     orders = "one sample", "with gradient", "second order", "third order"
     shaded = {
-        name: midrange.shade(cut(one, order), subject.baked, config.albedo)
+        name: midrange.shade(one.truncated(order), subject.baked, config.albedo)
         for order, name in enumerate(orders)
     }
     return shaded | _between(config, subject, grid, corners)
@@ -126,7 +126,7 @@ def _exactly(
     found = exact_expansion(lights, points, config.degree)
     one, corners = (jax.tree.map(operator.itemgetter(part), found) for part in (0, slice(1, None)))
     shaded = {
-        "one sample": midrange.shade(cut(one, 0), subject.baked, config.albedo),
+        "one sample": midrange.shade(one.truncated(0), subject.baked, config.albedo),
         "with gradient": midrange.shade(one, subject.baked, config.albedo),
     }
     return shaded | _between(config, subject, grid, corners)

@@ -14,7 +14,7 @@ from ..runner import Column, Context, Table, experiment
 from ..shared.lights import exact_light, rectangle
 from ..shared.plots import GROUND, Panel, View, draw_panels
 from ..shared.subjects import Subject, load
-from .scenes import cut, psnr
+from .scenes import psnr
 
 _COLOR = (1.0, 0.93, 0.8)
 _TOWARD = (0.0, -1.0, -0.12)  # to the camera: a little from below, where the light is seen
@@ -113,7 +113,7 @@ def _place(
     baked = eqx.tree_at(lambda t: t.positions, subject.baked, moved)
     mesh = eqx.tree_at(lambda m: m.vertices, subject.mesh, moved)
     shaded = {
-        name: midrange.shade(cut(expansion, order), baked, config.albedo)
+        name: midrange.shade(expansion.truncated(order), baked, config.albedo)
         for order, name in enumerate(_ORDERS)
     }
     exact = exact_light([light], moved, config.degree)

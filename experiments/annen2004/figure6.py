@@ -13,7 +13,7 @@ from jaxsh import imaging, midrange, sphere
 from ..runner import Column, Context, Table, experiment
 from ..shared.lights import exact_light
 from ..shared.plots import GROUND, Panel, draw_panels
-from .scenes import cut, three_lights
+from .scenes import three_lights
 
 _ORDERS = "sample", "with gradient", "second order"
 
@@ -67,14 +67,15 @@ def figure6(config: Figure6, context: Context) -> Table:
     cube = midrange.capture(scene, middle, config.resolution)
     expansion = midrange.taylor(cube, config.degree, 2)
     exact = exact_light(lights, mesh.vertices, config.degree)
-    errors = _relative(midrange.extrapolate(cut(expansion, 1), mesh.vertices), exact)
+    errors = _relative(midrange.extrapolate(expansion.truncated(1), mesh.vertices), exact)
     ranked = np.argsort(np.asarray(errors))
     chosen = [int(ranked[round(q * (len(ranked) - 1))]) for q in config.quantiles]
     rows = []
     for quantile, vertex in zip(config.quantiles, chosen, strict=True):
         point = mesh.vertices[vertex]
         found = {
-            order: midrange.extrapolate(cut(expansion, i), point) for i, order in enumerate(_ORDERS)
+            order: midrange.extrapolate(expansion.truncated(i), point)
+            for i, order in enumerate(_ORDERS)
         }
         there = midrange.capture(scene, point, config.resolution)
         found["its own cube"] = midrange.project_cube(there, config.degree)

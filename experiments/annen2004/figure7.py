@@ -17,7 +17,6 @@ from ..shared.subjects import Subject, load
 from .dots import glass
 from .methods import Trial, box_grid, take
 from .overlap import overlapping, overlapping_light
-from .scenes import cut
 
 _SAMPLES = 8
 _WIDTH = 0.9  # of a panel, in its heights
@@ -118,7 +117,7 @@ def _renderings(trial: Trial, sampled: dict[str, Sampled]) -> Iterator[Shown]:
     """All but the reference, by both gradients."""
     surface, edges = sampled["surface"], sampled["edges"]
     grid = box_grid(trial.subject, 2).weights(trial.subject.baked.positions)
-    yield Shown("a", "one sample", trial.shade(cut(surface.one, 0)))
+    yield Shown("a", "one sample", trial.shade(surface.one.truncated(0)))
     yield Shown("b", "one, gradient", trial.shade(surface.one))
     plain, full = trial.blend(surface.eight, "none"), trial.blend(surface.eight, "full")
     yield Shown("e", "eight", plain.radiance, plain.exponent)

@@ -14,7 +14,6 @@ from ..runner import Column, Context, Table, experiment
 from ..shared.tables import named
 from .overlap import filled_light, overlapping, overlapping_light
 from .plots import draw_distances
-from .scenes import cut
 
 _ORDERS = "constant", "first order", "second order", "third order"
 _EDGES = "first order, edge gradient"
@@ -82,7 +81,7 @@ def _expansions(
     cube = midrange.capture(midrange.Scene(lights), center, config.resolution)
     third = midrange.taylor(cube, config.degree, 3)
     edges = midrange.project_cube_with_gradient(cube, config.degree, gradient="edges")
-    made = {name: cut(third, order) for order, name in enumerate(_ORDERS)}
+    made = {name: third.truncated(order) for order, name in enumerate(_ORDERS)}
     return made | {_EDGES: midrange.make_expansion(cube.point, *edges)}
 
 

@@ -16,7 +16,7 @@ from ..shared.lights import exact_light
 from ..shared.plots import Panel, View, draw_panels
 from ..shared.subjects import Subject, load
 from .methods import box_grid, expand, take
-from .scenes import cut, exact_expansion, three_lights
+from .scenes import exact_expansion, three_lights
 
 _WIDTH = 0.8  # of a panel, in its heights
 _ORDERS = "one sample", "with gradient", "second order"
@@ -104,7 +104,7 @@ def _approximate(
     one = expand(lights, subject.centroid[None], config.degree, 2)
     one = jax.tree.map(lambda a: a[0], one)
     for order, name in enumerate(_ORDERS):
-        yield name, midrange.extrapolate(cut(one, order), vertices)
+        yield name, midrange.extrapolate(one.truncated(order), vertices)
     grids = [box_grid(subject, count) for count in _GRIDS]
     points = jnp.concatenate([grid.points for grid in grids])
     expansions, start = exact_expansion(lights, points, config.degree), 0

@@ -17,7 +17,7 @@ from ..shared.tables import named
 from ..shared.timing import fastest
 from .methods import Trial, expand, inner_grid, take
 from .plots import draw_orders
-from .scenes import cut, three_lights
+from .scenes import three_lights
 
 _TARGETS = 25, 30, 35, 40, 45, 50, 55, 60
 _STAGES = "capture", "project", "shade"
@@ -89,7 +89,7 @@ def orders(config: Orders, context: Context) -> list[Table]:
             row: dict[str, Any] = {"samples": count, "order": order, **spent}
             row["total"] = sum(spent.values())
             for source, expansion in sources.items():
-                expansion = layout.pick(cut(expansion, order))
+                expansion = layout.pick(expansion.truncated(order))
                 row[source] = trial.psnr(trial.shade(expansion, layout.weights, layout.rule))
             rows.append(row)
     for row in rows:

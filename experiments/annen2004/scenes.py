@@ -41,11 +41,6 @@ def exact_expansion(
     return midrange.make_expansion(jnp.asarray(points), light, gradient)
 
 
-def cut(expansion: midrange.Expansion, order: int) -> midrange.Expansion:
-    """The same expansion to a lower order."""
-    return midrange.Expansion(expansion.point, expansion.terms[..., : (1, 4, 10, 20)[order]])
-
-
 def psnr(values: Float[Array, "v 3"], reference: Float[Array, "v 3"], exposure: float) -> float:
     """Of radiance at vertices, linear, not clipped; the peak is what the exposure takes to 1."""
     error = exposure * (values - reference)[None]

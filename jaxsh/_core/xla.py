@@ -1,5 +1,6 @@
 """Control over what XLA fuses and in what pieces it computes."""
 
+import functools
 import itertools
 import math
 from typing import Any
@@ -42,6 +43,42 @@ def materialize(function, *arguments):
         return jax.lax.cond(never, zeros, function, *arguments)
 
     return jax.lax.platform_dependent(*arguments, cpu=conditional, default=function)
+
+
+def in_turn(function, tree):
+    """`function` of each row of a tree of arrays: one after the other on one CPU, else all at once.
+
+    For rows that are large themselves, where a batch would only leave the cache.
+    """
+
+    def loop(tree):
+        return jax.lax.map(function, tree)
+
+    if on_mesh(tree):
+        return jax.vmap(function)(tree)
+    return jax.lax.platform_dependent(tree, cpu=loop, default=jax.vmap(function))
+
+
+def device_cache(maxsize: int):
+    """`functools.lru_cache` for constants on a device, apart for each default device and float.
+
+    Computed at once, also while something else is being traced.
+    """
+
+    def decorate(function):
+        @functools.lru_cache(maxsize=maxsize)
+        def keyed(_device, _float, *arguments):
+            with jax.ensure_compile_time_eval():
+                return function(*arguments)
+
+        @functools.wraps(function)
+        def cached(*arguments):
+            device = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
+            return keyed(device, jnp.result_type(float), *arguments)
+
+        return cached
+
+    return decorate
 
 
 def in_blocks(function, *arrays, size: int, most: int | None = None):

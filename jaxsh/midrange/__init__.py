@@ -5,20 +5,16 @@ projected with its derivatives; extrapolation and interpolation carry that to ev
 it stand exact lights, polygons and spheres, that need no cube.
 """
 
-from ._analytic import capture_analytic
 from ._capture import capture
 from ._cube import RadianceCube
-from ._emissive import EmissiveMesh
+from ._emitters import EmissiveMesh, Polygon, Sphere
 from ._expansion import Expansion, extrapolate, make_expansion, monomials
 from ._grid import Grid, grid_around
 from ._interpolate import interpolate
-from ._placement import place_samples
-from ._polygon import Polygon
+from ._placement import Update, place_samples, update_samples
 from ._polygon_harmonics import polygon_harmonics, polygon_harmonics_with_gradient
-from ._project_cube import project_cube_with_gradient
 from ._scene import Scene
 from ._shade import shade
-from ._sphere import Sphere
 from ._sphere_harmonics import sphere_harmonics, sphere_harmonics_with_gradient
 from ._surface import (
     SurfaceSamples,
@@ -26,8 +22,7 @@ from ._surface import (
     project_surface_with_gradient,
     surface_samples,
 )
-from ._taylor import project_cube, taylor
-from ._update import Update, update_samples
+from ._taylor import project_cube, project_cube_with_gradient, taylor
 from ._weights import Weights, inverse_distance_weights, moving_least_squares_weights
 
 __all__ = [
@@ -42,7 +37,6 @@ __all__ = [
     "Update",
     "Weights",
     "capture",
-    "capture_analytic",
     "extrapolate",
     "grid_around",
     "interpolate",

@@ -8,65 +8,58 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Bool, Float
 
-from .._core.checks import as_float, check_size
+from .._core.checks import flatten_batch
 from ._cube import RadianceCube, texels
-from ._polygon import Polygon
-from ._rows import Rows, dot
-from ._sphere import Sphere
+from ._emitters import Polygon, Sphere
+from ._vectors import Components, component_dot
 
 Shape = Polygon | Sphere
 
 
 class _Seen(NamedTuple):
-    """What the texels see so far; vectors as three rows."""
+    """The nearest surface of each texel so far; vectors as three arrays."""
 
     inverse: Float[Array, " n"]  # 1/r
-    offset: Float[Array, " n"]
-    normal: Rows
-    radiance: Rows
+    plane_distance: Float[Array, " n"]
+    normal: Components
+    radiance: Components
 
 
-def capture_analytic(
+def capture_shapes(
     emitters: Sequence[Shape],
-    point: Float[ArrayLike, "*batch 3"],
-    resolution: int = 64,
-    *,
-    blockers: Sequence[Shape] = (),
+    blockers: Sequence[Shape],
+    sky: Float[ArrayLike, "n 3"],
+    point: Float[Array, "*batch 3"],
+    resolution: int,
 ) -> RadianceCube:
-    """`capture` of few polygons and spheres without Embree, for use inside `jit` and `vmap`.
-
-    Each ray is tested against each edge of each simple polygon, so the cost grows with their
-    number. Differentiable in the points, vertices, centres and radii, through distances, offsets
-    and normals, and in the radiance. Which surface a texel sees is constant: for the coefficients'
-    derivative in the point take that of `project_cube_with_gradient`.
-    The result has the dtype of the point. Raises `ValueError` for wrong shapes.
-    """
-    resolution = check_size("resolution", resolution)
-    point = as_float(point)
-    if point.ndim == 0 or point.shape[-1] != 3:
-        raise ValueError(f"expected points (..., 3), got shape {point.shape}")
+    """Cubes of polygons and spheres before a sky, given by texel, in the dtype of the points."""
     directions = tuple(texels(resolution).directions.astype(point.dtype).T)
-    return _cubes(tuple(emitters), tuple(blockers), directions, point)
+    rows = tuple(jnp.asarray(sky, point.dtype).T)
+    return _cubes(tuple(emitters), tuple(blockers), directions, rows, point)
 
 
 @jax.jit
 def _cubes(
     emitters: tuple[Shape, ...],
     blockers: tuple[Shape, ...],
-    directions: Rows,
+    directions: Components,
+    sky: Components,
     point: Float[Array, "*batch 3"],
 ) -> RadianceCube:
     emitters, blockers = jax.tree.map(lambda a: a.astype(point.dtype), (emitters, blockers))
     shapes = [*((shape, True) for shape in emitters), *((shape, False) for shape in blockers)]
-    flat = jax.vmap(functools.partial(_cube, shapes, directions))(point.reshape(-1, 3))
+    flat = jax.vmap(functools.partial(_cube, shapes, directions, sky))(flatten_batch(point))
     return jax.tree.map(lambda a: a.reshape(*point.shape[:-1], *a.shape[1:]), flat)
 
 
 def _cube(
-    shapes: list[tuple[Shape, bool]], directions: Rows, point: Float[Array, " 3"]
+    shapes: list[tuple[Shape, bool]],
+    directions: Components,
+    sky: Components,
+    point: Float[Array, " 3"],
 ) -> RadianceCube:
     zero = jnp.zeros_like(directions[0])
-    nearest = _Seen(zero, jnp.full_like(zero, -jnp.inf), (zero, zero, zero), (zero, zero, zero))
+    nearest = _Seen(zero, jnp.full_like(zero, -jnp.inf), (zero, zero, zero), sky)
     for shape, shines in shapes:
         if isinstance(shape, Polygon):
             hit, seen = _see_polygon(shape, shines, point, directions)
@@ -77,11 +70,11 @@ def _cube(
     found = nearest.inverse > 0
     distance = jnp.where(found, 1 / jnp.where(found, nearest.inverse, 1), jnp.inf)
     radiance, normal = (jnp.stack(rows, axis=-1) for rows in (nearest.radiance, nearest.normal))
-    return RadianceCube(radiance, distance, nearest.offset, normal, point)
+    return RadianceCube(radiance, distance, nearest.plane_distance, normal, point)
 
 
 def _see_polygon(
-    polygon: Polygon, shines: bool, point: Float[Array, " 3"], directions: Rows
+    polygon: Polygon, shines: bool, point: Float[Array, " 3"], directions: Components
 ) -> tuple[Bool[Array, " n"], _Seen]:
     to_vertices = polygon.vertices - point[None]
     edges = polygon.vertices[1:] - polygon.vertices[:1]
@@ -94,10 +87,10 @@ def _see_polygon(
     second = jnp.cross(normal, first)
     normal = jnp.where(behind, -normal, normal)
     h = -jnp.abs(h)
-    inverse = dot(tuple(normal), directions) / jnp.where(h < 0, h, -1)
+    inverse = component_dot(tuple(normal), directions) / jnp.where(h < 0, h, -1)
     ahead = (inverse > 0) & (h < 0)
     distance = 1 / jnp.where(ahead, inverse, 1)
-    x, y = (dot(tuple(axis), directions) * distance for axis in (first, second))
+    x, y = (component_dot(tuple(axis), directions) * distance for axis in (first, second))
     inside = _inside(to_vertices @ first, to_vertices @ second, x, y)
     bright = jnp.logical_or(polygon.two_sided, ~behind) & shines
     light = jnp.where(bright, polygon.radiance, 0)
@@ -116,10 +109,10 @@ def _inside(u: Float[Array, " v"], v: Float[Array, " v"], x: Array, y: Array) ->
 
 
 def _see_sphere(
-    sphere: Sphere, shines: bool, point: Float[Array, " 3"], directions: Rows
+    sphere: Sphere, shines: bool, point: Float[Array, " 3"], directions: Components
 ) -> tuple[Bool[Array, " n"], _Seen]:
     way = sphere.center - point
-    along, depth = dot(tuple(way), directions), sphere.radius**2 - jnp.dot(way, way)
+    along, depth = component_dot(tuple(way), directions), sphere.radius**2 - jnp.dot(way, way)
     squared = along * along + depth
     met = squared > 0
     root = jnp.sqrt(jnp.where(met, squared, 1))
@@ -137,6 +130,6 @@ def _fill(value: Float[Array, ""], like: Float[Array, " n"]) -> Float[Array, " n
     return jnp.full_like(like, 1) * value
 
 
-def _rows(vector: Float[Array, " 3"], like: Float[Array, " n"]) -> Rows:
+def _rows(vector: Float[Array, " 3"], like: Float[Array, " n"]) -> Components:
     x, y, z = (_fill(component, like) for component in vector)
     return x, y, z

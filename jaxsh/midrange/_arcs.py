@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 from .._core.xla import materialize
 from ..harmonics import degrees, evaluate
 from ..harmonics._tables import gradient_table
-from ._vectors import cross, dot, inverse_length, reciprocal, scale, unit
+from ._vectors import cross, dot, inverse_length, reciprocal, scale
 
 _Y0 = float(np.sqrt(1 / (4 * np.pi)))
 
@@ -45,7 +45,11 @@ def edge_arcs(start: Rows, end: Rows) -> Arcs:
     """
     along = end - start
     area = cross(start, along)  # not start×end: far away these are almost parallel
-    return Arcs(start, end, unit(area), scale(reciprocal(dot(area, area)), cross(along, area)))
+    inverse = inverse_length(area)
+    # along × area, divided by |area|².
+    squared = inverse * inverse
+    near = scale(squared * dot(along, along), start) - scale(squared * dot(along, start), along)
+    return Arcs(start, end, scale(inverse, area), near)
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(3,))
@@ -65,13 +69,13 @@ def coefficients(
         flux, turn = total
         span, normal, triangle = arc
         if degree:
-            nodes, weights = _nodes(span, degree)
+            nodes, weights = materialize(functools.partial(_nodes, degree), span)
             integral = materialize(_integrate_even, _basis(nodes, degree - 1), weights)
             flux = flux + normal[:, None] * integral[None]
         return (flux, _product(turn, triangle)), None
 
     nothing, no_turn = _nothing(start, degree**2, 3)
-    spans, triangles = _spans(start, end, normal), _triangles(start, end)
+    spans, triangles = _spans(start, end, normal)
     (flux, turn), _ = jax.lax.scan(add_arc, (nothing, no_turn), (spans, normal, triangles))
     return _from_flux(flux, _argument(turn), degree)
 
@@ -95,11 +99,11 @@ def _rate(start: Rows, end: Rows, normal: Rows, start_moves: Rows, end_moves: Ro
     @jax.checkpoint  # in reverse, evaluate an arc's basis again rather than hold those of all
     def add_arc(total, arc):
         span, speed = arc
-        nodes, weights = _nodes(span, degree + 2)
+        nodes, weights = materialize(functools.partial(_nodes, degree + 2), span)
         return total + _integrate_odd(_basis(nodes, degree), _times(weights, nodes, speed)), None
 
     nothing, _ = _nothing(start, (degree + 1) ** 2)
-    return jax.lax.scan(add_arc, nothing, (_spans(start, end, normal), speed))[0]
+    return jax.lax.scan(add_arc, nothing, (_spans(start, end, normal)[0], speed))[0]
 
 
 def coefficients_with_gradient(
@@ -107,24 +111,23 @@ def coefficients_with_gradient(
 ) -> tuple[Float[Array, "k n"], Float[Array, "3 k n"]]:
     """∫ y_k dω, and its gradient by the receiver's position, eq. (4), at the same nodes."""
     lower = degree**2
+    sloped_nodes = functools.partial(_sloped_nodes, degree + 2)
 
     @jax.checkpoint
     def add_arc(total, arc):
         flux, pull, turn = total
         span, normal, near, triangle = arc
-        nodes, weights = _nodes(span, degree + 2)
-        basis = _basis(nodes, degree)
-        change = materialize(_integrate_odd, basis, materialize(_times, weights, nodes, near))
+        nodes, weights, slopes = materialize(sloped_nodes, span, near)
+        change, *integrals = materialize(_integrate_both, _basis(nodes, degree), weights, slopes)
         if degree:
-            flux = (
-                flux + normal[:, None] * materialize(_integrate_even, basis[:lower], weights)[None]
-            )
+            flux = flux + normal[:, None] * integrals[0][None]
         return (flux, pull + normal[:, None] * change[None], _product(turn, triangle)), None
 
     start, end, normal, near = arcs
     no_flux, no_turn = _nothing(start, lower, 3)
     no_pull, _ = _nothing(start, (degree + 1) ** 2, 3)
-    each = _spans(start, end, normal), normal, near, _triangles(start, end)
+    spans, triangles = _spans(start, end, normal)
+    each = spans, normal, near, triangles
     (flux, pull, turn), _ = jax.lax.scan(add_arc, (no_flux, no_pull, no_turn), each)
     return _from_flux(flux, _argument(turn), degree), -pull
 
@@ -141,14 +144,6 @@ def _nothing(start: Rows, rows: int, *axes: int) -> tuple[Array, Complex]:
 
 def _product(a: Complex, b: Complex) -> Complex:
     return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
-
-
-def _triangles(start: Rows, end: Rows) -> Complex:
-    """The complex numbers of the arcs' triangles with one apex, the first start, in eq. (2)."""
-    a, b, apex = unit(start), unit(end), unit(start[:1])
-    real = 1 + dot(apex, a) + dot(apex, b) + dot(a, b)
-    area = cross(start, end - start)
-    return real, -dot(apex, area) * inverse_length(start) * inverse_length(end)
 
 
 def _argument(turn: Complex) -> Float[Array, " n"]:
@@ -170,17 +165,27 @@ class _Spans(NamedTuple):
     cosine: Float[Array, "*arcs n"]
 
 
-def _spans(start: Rows, end: Rows, normal: Rows) -> _Spans:
+def _spans(start: Rows, end: Rows, normal: Rows) -> tuple[_Spans, Complex]:
+    """Arcs by their middles, and the complex numbers of eq. (2).
+
+    Those belong to the arcs' triangles, which have one apex, the first start.
+    """
     inverse_start, inverse_end = inverse_length(start), inverse_length(end)
     a = scale(inverse_start, start)
-    middle = unit(a + scale(inverse_end, end))
-    cosine = dot(middle, a)
-    cosine = jnp.where(cosine == 0, 1, cosine)  # an arc of no length: receiver on the edge
-    turn = dot(normal, cross(start, end - start)) * (inverse_start * inverse_end)
-    return _Spans(middle, cross(normal, middle), turn / (2 * cosine), cosine)
+    both = a + scale(inverse_end, end)
+    inverse = inverse_length(both)
+    squared = dot(both, both)  # 2 + 2 cos θ
+    middle = scale(inverse, both)
+    # Zero for an arc of no length: a receiver on the edge.
+    cosine = jnp.where(inverse == 0, 1, squared * inverse / 2)
+    area = cross(start, end - start)
+    sine = dot(normal, area) * (inverse_start * inverse_end) * inverse
+    apex = a[:1]
+    triangles = squared / 2 + dot(apex, both), -dot(apex, area) * inverse_start * inverse_end
+    return _Spans(middle, cross(normal, middle), sine, cosine), triangles
 
 
-def _nodes(span: _Spans, count: int) -> tuple[Float[Array, "3 count n"], Complex]:
+def _nodes(count: int, span: _Spans) -> tuple[Float[Array, "3 count n"], Complex]:
     """Nodes on an arc's great circle, and their weights for even and for odd integrands.
 
     Exact up to degree count - 1, eq. (3).
@@ -188,24 +193,27 @@ def _nodes(span: _Spans, count: int) -> tuple[Float[Array, "3 count n"], Complex
     t = (np.arange(count) - (count - 1) / 2) * np.pi / count
     k = np.arange(1, count)[:, None]
     table = 4 / (count * k) * np.cos(k * t)
+    middle, tangent, sine, cosine = span
+    cos, sin, factors = (
+        jnp.asarray(x, sine.dtype)[..., None] for x in (np.cos(t), np.sin(t), table)
+    )
+    sines = [jnp.zeros_like(sine), sine]  # of kθ/2
+    for _ in range(2, count):
+        sines.append(2 * cosine * sines[-1] - sines[-2])
+    even = jnp.broadcast_to(2 * jnp.arctan2(sine, cosine)[None] / count, (count, len(sine)))
+    odd = jnp.zeros_like(even)
+    for k in range(2, count, 2):
+        even = even + factors[k - 1] * sines[k][None]
+    for k in range(1, count, 2):
+        odd = odd + factors[k - 1] * sines[k][None]
+    points = cos[None] * middle[:, None] + sin[None] * tangent[:, None]
+    return points, (even, odd)
 
-    def nodes(middle, tangent, sine, cosine):
-        cos, sin, factors = (
-            jnp.asarray(x, sine.dtype)[..., None] for x in (np.cos(t), np.sin(t), table)
-        )
-        sines = [jnp.zeros_like(sine), sine]  # of kθ/2
-        for _ in range(2, count):
-            sines.append(2 * cosine * sines[-1] - sines[-2])
-        even = jnp.broadcast_to(2 * jnp.arctan2(sine, cosine)[None] / count, (count, len(sine)))
-        odd = jnp.zeros_like(even)
-        for k in range(2, count, 2):
-            even = even + factors[k - 1] * sines[k][None]
-        for k in range(1, count, 2):
-            odd = odd + factors[k - 1] * sines[k][None]
-        points = cos[None] * middle[:, None] + sin[None] * tangent[:, None]
-        return points, (even, odd)
 
-    return materialize(nodes, *span)
+def _sloped_nodes(count: int, span: _Spans, slope: Float[Array, "3 n"]):
+    """`_nodes`, and the weights times slope·ω."""
+    nodes, weights = _nodes(count, span)
+    return nodes, weights, _times(weights, nodes, slope)
 
 
 def _times(weights: Complex, nodes: Float[Array, "3 j n"], slope: Float[Array, "3 n"]) -> Complex:
@@ -227,6 +235,13 @@ def _integrate_even(basis: Array, weights: tuple[Array, Array]) -> Float[Array, 
 def _integrate_odd(basis: Array, weights: tuple[Array, Array]) -> Float[Array, "k n"]:
     """∫ y_k (slope·ω) dt: integrands of the parity of l + 1."""
     return _integrate(basis, weights, 1)
+
+
+def _integrate_both(basis: Float[Array, "k j n"], weights: Complex, slopes: Complex):
+    """∫ y_k (slope·ω) dt, and ∫ y_k dt for all degrees but the last."""
+    lower = (round(len(basis) ** 0.5) - 1) ** 2
+    odd = _integrate_odd(basis, slopes)
+    return (odd, _integrate_even(basis[:lower], weights)) if lower else (odd,)
 
 
 def _integrate(basis: Array, weights: tuple[Array, Array], parity: int) -> Float[Array, "k n"]:

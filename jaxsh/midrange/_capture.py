@@ -2,13 +2,16 @@
 
 import math
 import sys
+from typing import Any, Literal, cast
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from .._core.checks import as_float, check_size
+from .._core.checks import as_float, check_size, is_concrete
+from ._analytic import capture_shapes
 from ._cube import RadianceCube, texels
+from ._emitters import Polygon, Sphere
 from ._scene import Scene
 
 
@@ -17,31 +20,63 @@ def capture(
     point: Float[ArrayLike, "*batch 3"],
     resolution: int = 64,
     *,
+    rays: Literal["embree", "analytic"] = "embree",
     progress: bool = True,
 ) -> RadianceCube:
-    """What a scene looks like from one point (3,), or from each of many (..., 3).
+    """Capture the radiance that a scene sends to one point (3,), or to each of many (..., 3).
 
-    One ray goes through the centre of each texel, as in the paper's rendered cube maps (§5). Which
-    triangle it meets Embree says, in float32; distances and offsets come from that triangle's
-    plane, in float64. Spheres are met in closed form. The sky is the environment's mean over a
-    texel. A surface is seen from the side it shows: normals face the point, backs are black.
+    One ray goes through the center of each texel, as in the rendered cube maps of Annen et al.
+    2004 (§5). A surface is seen from the side it shows: normals face the point, backs are black.
+    The sky is the environment's mean over a texel.
 
-    `resolution` is the number of texels along a side of a face. Many points show a bar of their
-    `progress`, on a terminal. The result has the scene's dtype: float64 if any emitter has, else
-    float32. Constant to differentiation (`capture_analytic` is not). Raises `ValueError` for a
-    wrong shape or resolution, and for points that are not finite.
+    **Arguments**
+
+    - `scene`: emitters, blockers and environment.
+    - `point`: where the cube maps are taken, in the scene's unit of length.
+    - `resolution`: texels along a side of a face.
+    - `rays`:
+      "embree" finds each ray's triangle with `geometry.ray_scene`, by Embree where it is
+      installed and by JAX elsewhere, in float32; distances come from that triangle's plane, in
+      float64, and spheres are met in closed form. It runs on the host, outside of `jit`, and is
+      constant to differentiation.
+      "analytic" tests each ray against each edge of each polygon and each sphere, in JAX, so that
+      the cost grows with their number: for few of them, without meshes, inside `jit` and `vmap`.
+      Differentiable in points, vertices, centers, radii and radiance, through distances, normals
+      and radiance. Which surface a texel sees is constant: take the coefficients' derivative in
+      the point from `project_cube_with_gradient`.
+    - `progress`: with "embree", a bar for many points, on a terminal.
+
+    **Returns** a `RadianceCube`: with "embree" in the scene's dtype, float64 if any emitter has
+    it, else float32; with "analytic" in the dtype of the points, and sharded as they are.
+
+    Raises `ValueError` for a wrong shape, resolution or `rays`, for points that are not finite
+    where their values are known, and for meshes with "analytic".
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import midrange
+    >>> ball = midrange.Sphere(np.array([0.0, 0.0, 2.0]), np.array(0.5), np.ones(3))
+    >>> cube = midrange.capture(midrange.Scene([ball]), np.zeros(3), 8, rays="analytic")
+    >>> cube.radiance.shape, round(float(cube.distance.min()), 1)
+    ((384, 3), 1.5)
     """
     resolution = check_size("resolution", resolution)
-    points = np.asarray(as_float(point), np.float64)
-    if points.ndim == 0 or points.shape[-1] != 3:
-        raise ValueError(f"expected points (..., 3), got shape {points.shape}")
-    if not np.isfinite(points).all():
+    point = as_float(point)
+    if point.ndim == 0 or point.shape[-1] != 3:
+        raise ValueError(f"expected points (..., 3), got shape {point.shape}")
+    if is_concrete(point) and not jnp.isfinite(point).all():
         raise ValueError("points must be finite, got NaN or infinity")
+    if rays == "analytic":
+        return _analytic(scene, point, resolution)
+    if rays != "embree":
+        raise ValueError(f'expected rays "embree" or "analytic", got {rays!r}')
+    points = np.asarray(point, np.float64)
     batch, count = points.shape[:-1], 6 * resolution**2
     shapes = {
         "radiance": (count, 3),
         "distance": (count,),
-        "offset": (count,),
+        "plane_distance": (count,),
         "normal": (count, 3),
     }
     dtype = scene.dtype
@@ -54,6 +89,18 @@ def capture(
             array[place] = seen
     made = {name: jnp.asarray(array) for name, array in arrays.items()}
     return RadianceCube(**made, point=jnp.asarray(points, dtype))
+
+
+def _analytic(scene: Scene, point, resolution: int) -> RadianceCube:
+    shapes = (*scene.emitters, *scene.blockers)
+    meshes = [type(shape).__name__ for shape in shapes if not isinstance(shape, Polygon | Sphere)]
+    if meshes:
+        raise ValueError(
+            f'rays="analytic" takes polygons and spheres, got {meshes[0]}: use rays="embree"'
+        )
+    sky = scene.sky(resolution)
+    emitters, blockers = cast(Any, scene.emitters), cast(Any, scene.blockers)  # no meshes
+    return capture_shapes(emitters, blockers, sky, point, resolution)
 
 
 def _seen(scene: Scene, point: np.ndarray, directions: np.ndarray, resolution: int):

@@ -1,30 +1,29 @@
 """What a point sees: a cube map of radiance, and of the planes that it comes from."""
 
-import functools
 import math
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._core.checks import as_float
+from .._core.xla import device_cache
 from ..sphere import Quadrature, cube_map
 
 
 class RadianceCube(eqx.Module):
     """The N = 6·resolution² texels of a cube map around `point`, in the order of `cube_map`.
 
-    With s the way from the point to what a texel's centre sees, its surface has the unit `normal`
-    n, turned towards the point, the `distance` r = |s| and the plane `offset` h = n·s < 0. A texel
-    that sees nothing near has r = inf, h = -inf and n = 0; its radiance is that of the sky.
+    With s the way from the point to what a texel's center sees, its surface has the unit `normal`
+    n, turned towards the point, the `distance` r = |s| and the signed `plane_distance` h = n·s < 0.
+    A texel that sees nothing near has r = inf, h = -inf and n = 0; its radiance is that of the sky.
     The leading axes are those of the points. Each surface is taken to send the same radiance to
     all sides (Annen et al. 2004, §4).
     """
 
     radiance: Float[Array, "*batch n 3"] = eqx.field(converter=as_float)
     distance: Float[Array, "*batch n"] = eqx.field(converter=as_float)
-    offset: Float[Array, "*batch n"] = eqx.field(converter=as_float)
+    plane_distance: Float[Array, "*batch n"] = eqx.field(converter=as_float)
     normal: Float[Array, "*batch n 3"] = eqx.field(converter=as_float)
     point: Float[Array, "*batch 3"] = eqx.field(converter=as_float)
 
@@ -32,7 +31,7 @@ class RadianceCube(eqx.Module):
         *batch, count = self.distance.shape
         shapes = {
             "radiance": (*batch, count, 3),
-            "offset": (*batch, count),
+            "plane_distance": (*batch, count),
             "normal": (*batch, count, 3),
             "point": (*batch, 3),
         }
@@ -59,15 +58,10 @@ class RadianceCube(eqx.Module):
         return texels(self.resolution).weights.astype(self.distance.dtype)
 
 
+@device_cache(maxsize=8)
 def texels(resolution: int) -> Quadrature:
-    """`cube_map`, kept for as long as JAX's default float stays what it is."""
-    return _texels(resolution, jnp.result_type(float))
-
-
-@functools.lru_cache(maxsize=8)
-def _texels(resolution: int, _default_float) -> Quadrature:
-    with jax.ensure_compile_time_eval():
-        return cube_map(resolution)
+    """`cube_map`, kept."""
+    return cube_map(resolution)
 
 
 def inverse_distances(cube: RadianceCube) -> tuple[Float[Array, "... n"], Float[Array, "... n 3"]]:
@@ -77,7 +71,7 @@ def inverse_distances(cube: RadianceCube) -> tuple[Float[Array, "... n"], Float[
     which no texel of a captured cube has much of.
     """
     epsilon = jnp.finfo(cube.distance.dtype).eps
-    near = jnp.abs(cube.offset) > epsilon * cube.distance  # false also for infinite ones
+    near = jnp.abs(cube.plane_distance) > epsilon * cube.distance  # false also for infinite ones
     inverse = jnp.where(near, 1 / jnp.where(near, cube.distance, 1), 0)
-    offset = jnp.where(near, cube.offset, 1)
+    offset = jnp.where(near, cube.plane_distance, 1)
     return inverse, jnp.where(near[..., None], cube.normal / offset[..., None], 0)

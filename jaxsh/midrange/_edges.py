@@ -5,15 +5,14 @@ b, ν the unit normal of e towards b (docs/near_light_cubes.md). What moves agai
 it is the nearer surface, at 1/r = q·ω_e on its own plane.
 """
 
-import functools
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._core.linalg import matmul
+from .._core.xla import device_cache
 from ..harmonics import evaluate
 from ..sphere import cube_map
 from ._cube import RadianceCube, inverse_distances
@@ -50,12 +49,12 @@ def _along(texels: Float[Array, "e 6"], edges: Edges) -> Float[Array, " e"]:
     return x + y + z
 
 
-@functools.lru_cache(maxsize=4)
+@device_cache(maxsize=4)
 def edge_table(resolution: int, degree: int, dtype) -> Edges:
-    with jax.ensure_compile_time_eval():
-        seams, centers, normals = _edges(resolution)
-        centers, normals = (jnp.asarray(a, dtype) for a in (centers, normals))
-        return Edges(seams, centers, normals, evaluate(centers, degree, axis=0))
+    """All edges of a cube of this resolution, and the basis on them; kept."""
+    seams, centers, normals = _edges(resolution)
+    centers, normals = (jnp.asarray(a, dtype) for a in (centers, normals))
+    return Edges(seams, centers, normals, evaluate(centers, degree, axis=0))
 
 
 def _edges(resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

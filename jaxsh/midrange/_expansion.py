@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float
+from .._core.checks import align, as_float, check_size
 from .._core.linalg import einsum
 from ..harmonics import degree_of
 
@@ -61,6 +61,16 @@ class Expansion(eqx.Module):
         if self.order == 0:
             raise ValueError("an expansion of order 0 has no gradient")
         return self.terms[..., 1:4]
+
+    def truncated(self, order: int) -> "Expansion":
+        """Cut the terms above `order`: the expansion that a lower order would have given.
+
+        Raises `ValueError` unless `order` is an integer from 0 to the expansion's own.
+        """
+        order = check_size("order", order, 0)
+        if order > self.order:
+            raise ValueError(f"an expansion of order {self.order} has no terms of order {order}")
+        return Expansion(self.point, self.terms[..., : len(term_orders(order))])
 
 
 def make_expansion(

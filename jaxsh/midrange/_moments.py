@@ -6,16 +6,15 @@ differences of the four texels that belong together need a table of one quarter 
 of each combination only the y_lm of its own parity: a quarter of the table and of the products.
 """
 
-import functools
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._core.host import read_only_cache
 from .._core.linalg import matmul
+from .._core.xla import device_cache
 from ..harmonics import degrees, evaluate, orders
 from ._cube import texels
 
@@ -30,22 +29,17 @@ class _Parity(NamedTuple):
     rows: Int[np.ndarray, " rows"]
 
 
+@device_cache(maxsize=16)
 def moment_tables(resolution: int, degree: int, dtype) -> Tables:
     """y_i dω at a quarter of the texels, kept: they are worth their memory (§4.2 of the paper)."""
-    return _tables(resolution, degree, jnp.dtype(dtype))
-
-
-@functools.lru_cache(maxsize=16)
-def _tables(resolution: int, degree: int, dtype) -> Tables:
-    with jax.ensure_compile_time_eval():
-        cube, part = texels(resolution), (slice(None), 0, slice(_rows(resolution) * resolution))
-        shape = 3, 2, resolution**2
-        # By NumPy, which has nothing to compile.
-        vectors = np.asarray(cube.directions).reshape(*shape, 3)[part]
-        weights = np.asarray(cube.weights).reshape(shape)[part]
-        table = np.asarray(evaluate(vectors, degree, axis=0)) * weights
-        parts = [table[each.rows, each.axis] for each in _parities(resolution, degree)]
-        return tuple(jnp.asarray(part, dtype) for part in parts)
+    cube, part = texels(resolution), (slice(None), 0, slice(_rows(resolution) * resolution))
+    shape = 3, 2, resolution**2
+    # By NumPy, which has nothing to compile.
+    vectors = np.asarray(cube.directions).reshape(*shape, 3)[part]
+    weights = np.asarray(cube.weights).reshape(shape)[part]
+    table = np.asarray(evaluate(vectors, degree, axis=0)) * weights
+    parts = [table[each.rows, each.axis] for each in _parities(resolution, degree)]
+    return tuple(jnp.asarray(part, dtype) for part in parts)
 
 
 def moments(

@@ -1,16 +1,24 @@
-"""Where to take samples."""
+"""Where to take samples, and samples that come and go as objects move."""
 
+import dataclasses
 import operator
 import warnings
+from collections.abc import Callable
 from typing import Literal
 
+import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import ArrayLike, Float
+from jaxtyping import ArrayLike, Bool, Float
 from scipy.cluster.vq import kmeans2, vq
 
-from ._predict import Choice, Evaluate, Prediction, check_points, probes_of
+from ..harmonics import clamped_cosine, convolve, degree_of
+from ._expansion import Expansion, extrapolate
+
+Evaluate = Callable[[Float[np.ndarray, "n 3"]], Expansion]
 
 _TRIES = 4
+_CORE = 1e-3  # of the probes' extent: what is nearer than this to a sample is at it
 
 
 def place_samples(
@@ -102,3 +110,183 @@ def _farthest(positions: np.ndarray, count: int) -> np.ndarray:
         squared = np.minimum(squared, np.sum(offsets**2, axis=1))
         chosen.append(int(np.argmax(squared)))
     return positions[chosen]
+
+
+@dataclasses.dataclass(frozen=True)
+class Prediction:
+    """What each of n candidates says about each of Q probes, beside what is so there.
+
+    All is irradiance: coefficients times λ_l, so that the sum of squares is the mean over all
+    normals, but for a factor. `powers` are the weights of eq. 16 before they are divided by their
+    sum.
+    """
+
+    said: Float[np.ndarray, "n q k"]
+    exact: Float[np.ndarray, "q k"]
+    powers: Float[np.ndarray, "n q"]
+
+    @classmethod
+    def of(
+        cls, evaluate: Evaluate, points: np.ndarray, probes: np.ndarray, exponent: float
+    ) -> "Prediction":
+        light = evaluate(np.concatenate([points, probes]))
+        wanted = (len(points) + len(probes),)
+        if light.point.shape[:-1] != wanted:
+            raise ValueError(f"expected expansions {wanted}, got {light.point.shape[:-1]}")
+        around = jax.tree.map(lambda leaf: leaf[: len(points), None], light)
+        said = extrapolate(around, jnp.asarray(probes, light.terms.dtype)[None])
+        exact = light.coefficients[len(points) :]
+        squared = np.sum((points[:, None].astype(float) - probes[None]) ** 2, axis=-1)
+        core = _CORE * np.linalg.norm(np.ptp(probes.astype(float), axis=0))
+        squared = squared + max(core, np.finfo(float).tiny) ** 2
+        powers = (squared.min(axis=0) / squared) ** (exponent / 2)
+        return cls(_irradiance(said), _irradiance(exact), powers)
+
+    def error(self, chosen: list[int], more: np.ndarray | None = None) -> np.ndarray:
+        """Relative RMS error of the blend of those chosen, and one of each of `more` in turn."""
+        total, share = self._blend(chosen)
+        if more is None:
+            total, share = total[None], share[None]
+        else:
+            total = total + self.powers[more, :, None] * self.said[more]
+            share = share + self.powers[more]
+        wrong = total / np.maximum(share, np.finfo(float).tiny)[..., None] - self.exact
+        wrong = np.sqrt(np.sum(wrong**2, axis=(-2, -1)))
+        size = np.sqrt(np.sum(self.exact**2))
+        return np.where(wrong > 0, wrong / max(size, np.finfo(float).tiny), 0)
+
+    def _blend(self, chosen: list[int]) -> tuple[np.ndarray, np.ndarray]:
+        powers = self.powers[chosen]
+        return np.einsum("nq,nqk->qk", powers, self.said[chosen]), powers.sum(axis=0)
+
+
+class Choice:
+    """A set of candidates that grows, shrinks and changes, with its error."""
+
+    def __init__(self, prediction: Prediction, chosen: list[int] | None = None):
+        self.prediction = prediction
+        self.chosen = list(chosen or [])
+        self.error = float(prediction.error(self.chosen)[0]) if self.chosen else np.inf
+
+    def add(self) -> bool:
+        """The candidate that helps most; false where none does."""
+        return self._improve(self.chosen)
+
+    def exchange(self) -> None:
+        """One sample for another, while that helps."""
+        while any(
+            self._improve(self.chosen[:i] + self.chosen[i + 1 :]) for i in range(len(self.chosen))
+        ):
+            pass
+
+    def remove(self, bound: float) -> bool:
+        """The sample that is missed least, if the error stays within the bound."""
+        without = [self.chosen[:i] + self.chosen[i + 1 :] for i in range(len(self.chosen))]
+        errors = [float(self.prediction.error(rest)[0]) for rest in without if rest]
+        if not errors or min(errors) > bound:
+            return False
+        self.chosen, self.error = without[int(np.argmin(errors))], min(errors)
+        return True
+
+    def _improve(self, kept: list[int]) -> bool:
+        rest = np.setdiff1d(np.arange(len(self.prediction.said)), self.chosen)
+        if len(rest) == 0:
+            return False
+        errors = self.prediction.error(kept, rest)
+        if not errors.min() < self.error * (1 - 1e-9):
+            return False
+        self.chosen, self.error = [*kept, int(rest[np.argmin(errors)])], float(errors.min())
+        return True
+
+
+def probes_of(positions: np.ndarray, count: int, seed: int) -> np.ndarray:
+    """Some of the positions, at random."""
+    rows = np.random.default_rng(seed).permutation(len(positions))[:count]
+    return positions[rows]
+
+
+def check_points(positions: Float[ArrayLike, "v 3"]) -> Float[np.ndarray, "v 3"]:
+    """As a NumPy array; raises `ValueError` unless (V, 3) with V >= 1 and finite."""
+    positions = np.asarray(positions)
+    if positions.ndim != 2 or positions.shape[1] != 3 or len(positions) == 0:
+        raise ValueError(f"expected positions (V, 3), V >= 1, got shape {positions.shape}")
+    if not np.issubdtype(positions.dtype, np.floating) or not np.isfinite(positions).all():
+        raise ValueError("expected positions that are finite floating-point numbers")
+    return positions
+
+
+def _irradiance(light) -> np.ndarray:
+    """(..., 3 K) of coefficients times λ_l."""
+    cosine = clamped_cosine(degree_of(light.shape[-1]))
+    product = np.asarray(convolve(light, cosine), np.float64)
+    return product.reshape(*product.shape[:-2], -1)
+
+
+@dataclasses.dataclass(frozen=True)
+class Update:
+    """What `update_samples` did: the samples now, those among them that are new, those gone.
+
+    `points` are those kept, in their order, and then the `added`. `removed` marks the samples
+    given that are no longer used. `error` is the relative RMS error predicted with `points`.
+    """
+
+    points: Float[np.ndarray, "s 3"]
+    added: Float[np.ndarray, "a 3"]
+    removed: Bool[np.ndarray, " n"]
+    error: float
+
+
+def update_samples(
+    points: Float[ArrayLike, "n 3"],
+    candidates: Float[ArrayLike, "c 3"],
+    positions: Float[ArrayLike, "v 3"],
+    evaluate: Evaluate,
+    *,
+    target: float,
+    release: float | None = None,
+    limit: int = 16,
+    exponent: float = 6.0,
+    probes: int = 128,
+    seed: int = 0,
+) -> Update:
+    """Adds samples where the error is above a target, or removes those that are not needed.
+
+    One step of an animation: what Annen et al. 2004 leave to future work. Where the predicted
+    error (as in `place_samples`, "greedy") is above `target`, candidates are added, the best
+    first, until it is not, none helps or `limit` is reached. Where it is not, samples are
+    removed, the least missed first, while the error without them stays at most `release`. The
+    two differ (hysteresis), so that a sample does not come and go with every frame.
+
+    **Arguments**
+
+    - `points` (N, 3), N >= 1: the samples so far, moved with the object if they ride on it.
+    - `candidates` (C, 3): where samples may be added, such as `place_samples(positions, 64)`,
+      moved likewise.
+    - `positions`: (V, 3), the object's vertices as they are now.
+    - `evaluate`: the expansions of the light as it is now around points (n, 3). It is called
+      once, with the samples, the candidates and the probes.
+    - `target`, and `release` below it (half of it if not given): relative RMS errors.
+    - `limit`: the most samples that may come of adding.
+    - `exponent`, `probes`, `seed`: as for `place_samples`.
+
+    **Returns** an `Update`. One sample always stays. Not differentiable.
+
+    Raises `ValueError` for shapes that do not fit, and a release not below the target.
+    """
+    points, candidates, positions = map(check_points, (points, candidates, positions))
+    release = target / 2 if release is None else release
+    if not 0 <= release < target:
+        raise ValueError(f"expected 0 <= release < target, got {release} and {target}")
+    pool = np.concatenate([points, candidates.astype(points.dtype)])
+    prediction = Prediction.of(evaluate, pool, probes_of(positions, probes, seed), exponent)
+    choice = Choice(prediction, list(range(len(points))))
+    if choice.error > target:
+        while choice.error > target and len(choice.chosen) < operator.index(limit):
+            if not choice.add():
+                break
+    else:
+        while choice.remove(release):
+            pass
+    kept = [i for i in choice.chosen if i < len(points)]
+    removed = ~np.isin(np.arange(len(points)), kept)
+    return Update(pool[choice.chosen], pool[choice.chosen[len(kept) :]], removed, choice.error)

@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, as_float, check_batches, check_degree, is_concrete
-from ._polygon import Polygon, is_convex
+from .._core.xla import in_blocks
+from ._emitters import Polygon, is_convex
 from ._visible import Plan, Scene, seen
 
 # Receivers per block: the basis of an arc's nodes stays in cache.
@@ -122,15 +123,9 @@ def _compiled(scene: Scene, point, normals, radiance, plan: Plan):
 
 def _unit_lights(scene: Scene, points, normals, plan: Plan):
     """(N, K), and (N, K, 3) with the gradient, of radiance 1 at N points, block by block."""
-    count = len(points)
-    size = max(1, min(_BLOCK, count))
-    both = jnp.concatenate([points, normals], axis=1)
-    filled = jnp.pad(both, ((0, -count % size), (0, 0)), mode="edge" if count else "constant")
 
-    @jax.checkpoint
-    def block(rows):
-        lights = seen(scene, rows[:, :3].T, rows[:, 3:].T, plan)
+    def block(points, normals):
+        lights = seen(scene, points.T, normals.T, plan)
         return tuple(jnp.moveaxis(light, (-1, -2), (0, 1)) for light in lights)
 
-    lights = jax.lax.map(block, filled.reshape(len(filled) // size, size, both.shape[1]))
-    return tuple(light.reshape(len(filled), *light.shape[2:])[:count] for light in lights)
+    return in_blocks(block, points, normals, size=_BLOCK)

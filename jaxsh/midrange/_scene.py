@@ -4,17 +4,16 @@ import functools
 import math
 from collections.abc import Sequence
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float
+from .._core.checks import as_float, is_concrete
 from ..geometry import Mesh, RayScene, ray_scene
 from ..imaging import look_up
 from ..sphere import cube_map
-from ._emissive import EmissiveMesh
-from ._polygon import Polygon
-from ._sphere import Sphere
+from ._emitters import EmissiveMesh, Polygon, Sphere
 from ._surfaces import Blocker, Emitter, Spheres, Triangles, spheres, triangles
 
 # Samples of the environment along each side of a texel, at most.
@@ -86,7 +85,10 @@ class Scene:
         if self.environment is None:
             return np.zeros((6 * resolution**2, 3))
         if resolution not in self._skies:
-            self._skies[resolution] = _texel_means(self.environment, resolution)
+            if not is_concrete(self.environment):
+                raise ValueError("a scene's environment must be known, outside of what is traced")
+            with jax.ensure_compile_time_eval():
+                self._skies[resolution] = _texel_means(self.environment, resolution)
         return self._skies[resolution]
 
 

@@ -10,8 +10,8 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import align, as_float
 from .._core.linalg import matmul
 from ..transfer import Transfer
-from ._blend import Rule, check_weights, over_samples, rule_terms, take_rows
 from ._expansion import Expansion, monomial_list
+from ._interpolate import Rule, check_weights, over_samples, rule_terms, take_rows
 from ._weights import Weights
 
 

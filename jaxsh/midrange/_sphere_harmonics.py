@@ -9,7 +9,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, as_float, check_degree, is_concrete
 from ..harmonics import degrees, evaluate, evaluate_with_gradient
-from ._sphere import Sphere
+from ._emitters import Sphere
 
 
 def sphere_harmonics(

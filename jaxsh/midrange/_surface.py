@@ -14,8 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_degree, check_size
+from .._core.checks import as_float, check_degree, check_size, flatten_batch
 from .._core.linalg import matmul
+from .._core.xla import in_turn
 from ..harmonics import evaluate, evaluate_with_gradient
 from ..sphere import fibonacci
 from ._surfaces import Emitter, spheres, triangles
@@ -100,7 +101,7 @@ def _at_points(project, samples, point, degree):
     point = point.astype(samples.points.dtype)
     if point.ndim == 1:
         return project(samples, point, degree)
-    rows = jax.lax.map(functools.partial(project, samples, degree=degree), point.reshape(-1, 3))
+    rows = in_turn(functools.partial(project, samples, degree=degree), flatten_batch(point))
     return jax.tree.map(lambda a: a.reshape(*point.shape[:-1], *a.shape[1:]), rows)
 
 

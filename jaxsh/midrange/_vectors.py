@@ -10,7 +10,7 @@ def dot(a: Array, b: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    (ax, ay, az), (bx, by, bz) = (jnp.moveaxis(v, -2, 0) for v in (a, b))
+    (ax, ay, az), (bx, by, bz) = ([v[..., i, :] for i in range(3)] for v in (a, b))
     return jnp.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-2)
 
 
@@ -38,3 +38,11 @@ def inverse_length(a: Array) -> Array:
 def unit(a: Array) -> Array:
     """a/|a|, and zero for zero."""
     return scale(inverse_length(a), a)
+
+
+Components = tuple[Array, Array, Array]
+
+
+def component_dot(a: Components, b: Components) -> Array:
+    """Of vectors as three arrays x, y and z, of any shape."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -10,7 +10,7 @@ from PIL import Image
 from experiments.annen2004.figure1_5 import Figure15
 from experiments.annen2004.figure4 import Figure4
 from experiments.annen2004.figure6 import Figure6, _unfolded
-from experiments.annen2004.scenes import cut, exact_expansion, psnr, three_lights
+from experiments.annen2004.scenes import exact_expansion, psnr, three_lights
 from experiments.annen2004.table1 import Table1
 from experiments.runner import Context, Data
 from experiments.runner.cli import main
@@ -140,7 +140,7 @@ def test_lights_of_the_scene_do_not_hide_each_other():
 def test_each_light_is_brightest_and_grows_towards_itself():
     lights, at = three_lights(3.0, 1.0), jnp.asarray([0.2, -0.3, 0.4])
     expansion = exact_expansion(lights, at, 1)
-    assert (expansion.order, cut(expansion, 0).order) == (1, 0)
+    assert (expansion.order, expansion.truncated(0).order) == (1, 0)
     for channel, light in enumerate(lights):
         towards = jnp.mean(light.vertices, axis=0) - at
         towards = towards / jnp.linalg.norm(towards)

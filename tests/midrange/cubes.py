@@ -4,7 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsh import harmonics
-from jaxsh.midrange._cube import RadianceCube
+from jaxsh.midrange import (
+    RadianceCube,
+)
 from jaxsh.sphere import cube_map
 
 
@@ -21,7 +23,7 @@ def random_cube(rng, resolution=4, dtype=np.float64, batch=(), sky=0.1):
     arrays = {
         "radiance": rng.uniform(size=(*shape, 3)),
         "distance": np.where(nothing, np.inf, distance),
-        "offset": np.where(nothing, -np.inf, offset),
+        "plane_distance": np.where(nothing, -np.inf, offset),
         "normal": np.where(nothing[..., None], 0, normal),
         "point": rng.normal(size=(*batch, 3)),
     }
@@ -31,7 +33,7 @@ def random_cube(rng, resolution=4, dtype=np.float64, batch=(), sky=0.1):
 def moved(cube, d, degree):
     """The texel form at point + d, Σ L dω (1 - n·d/h) y(ω′) (r/r′)³: (3, K)."""
     near = jnp.isfinite(cube.distance)
-    r, h = jnp.where(near, cube.distance, 1), jnp.where(near, cube.offset, 1)
+    r, h = jnp.where(near, cube.distance, 1), jnp.where(near, cube.plane_distance, 1)
     s = cube.directions * r[:, None] - jnp.outer(near.astype(d.dtype), d)
     shrunk = (r / jnp.sqrt(jnp.sum(s * s, axis=-1))) ** 3 * (1 - cube.normal @ d / h)
     basis = harmonics.evaluate(s, degree)

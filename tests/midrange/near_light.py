@@ -9,7 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsh.harmonics import evaluate
-from jaxsh.midrange._expansion import Expansion
+from jaxsh.midrange import (
+    Expansion,
+)
 from jaxsh.transfer import Transfer
 
 _EMITTERS = np.array([[1.9, 0.3, 0.8], [-1.2, 1.6, 0.5], [0.1, -1.4, -1.7]])

@@ -8,14 +8,16 @@ from lights import rectangle
 
 from jaxsh import harmonics
 from jaxsh.geometry import make_mesh
-from jaxsh.midrange._analytic import capture_analytic
-from jaxsh.midrange._capture import capture
-from jaxsh.midrange._emissive import EmissiveMesh
-from jaxsh.midrange._polygon import Polygon
-from jaxsh.midrange._project_cube import project_cube_with_gradient
-from jaxsh.midrange._scene import Scene
-from jaxsh.midrange._sphere import Sphere
-from jaxsh.midrange._taylor import project_cube, taylor
+from jaxsh.midrange import (
+    EmissiveMesh,
+    Polygon,
+    Scene,
+    Sphere,
+    capture,
+    project_cube,
+    project_cube_with_gradient,
+    taylor,
+)
 from jaxsh.sphere import project_lat_long, reconstruct_lat_long
 
 # Cubes are projected at 64² texels and degree 2 throughout: one program of each form.
@@ -35,7 +37,7 @@ def assert_same(a, b, atol=1e-12, differ=0):
     """All but `differ` texels, through whose surfaces' edges a float32 ray may pass elsewhere."""
     same = np.isclose(a.distance, b.distance, rtol=1e-9)
     assert np.sum(~same) <= differ
-    for name in ("radiance", "normal", "offset"):
+    for name in ("radiance", "normal", "plane_distance"):
         first, second = (np.asarray(getattr(cube, name))[same] for cube in (a, b))
         np.testing.assert_allclose(first, second, atol=atol)
 
@@ -53,7 +55,7 @@ def test_embree_and_jax_see_the_same():
     points = jnp.array([[0.1, 0.2, -0.1], [0, 0.8, 1.05], [-1, 1, 3]])
     assert_same(
         capture(Scene(emitters, blockers), points, 32),
-        jax.jit(lambda p: capture_analytic(emitters, p, 32, blockers=blockers))(points),
+        jax.jit(lambda p: capture(Scene(emitters, blockers), p, 32, rays="analytic"))(points),
         differ=5,
     )
 
@@ -63,9 +65,11 @@ def test_planes_distances_and_directions_agree():
     near = np.isfinite(cube.distance)
     s = np.asarray(cube.directions * cube.distance[:, None])[near]
     normal, corner = np.asarray(cube.normal)[near], LIGHT[0] - [0.1, 0.2, -0.1]
-    np.testing.assert_allclose(np.sum(normal * s, -1), np.asarray(cube.offset)[near], rtol=1e-13)
+    np.testing.assert_allclose(
+        np.sum(normal * s, -1), np.asarray(cube.plane_distance)[near], rtol=1e-13
+    )
     np.testing.assert_allclose(np.sum(normal * (s - corner), -1), 0, atol=1e-13)
-    assert (np.asarray(cube.offset) < 0).all()
+    assert (np.asarray(cube.plane_distance) < 0).all()
     assert near.any()
     assert not np.asarray(cube.radiance)[~near].any()
     np.testing.assert_allclose(np.sum(cube.solid_angles), 4 * np.pi, rtol=1e-14)
@@ -73,7 +77,7 @@ def test_planes_distances_and_directions_agree():
 
 def test_solid_angles_are_exact():
     """Of a texel as a spherical quadrilateral: the sum of its angles less 2π."""
-    cube = capture_analytic([], jnp.zeros(3), 3)
+    cube = capture(Scene([]), jnp.zeros(3), 3, rays="analytic")
     corners = np.stack(np.meshgrid(*[np.linspace(-1, 1, 4)] * 2, indexing="ij"), -1)
     expected = []
     for i in range(3):
@@ -141,8 +145,21 @@ def test_a_small_sun_of_the_environment_is_not_missed():
     np.testing.assert_allclose(project_cube(cube, 0), exact, rtol=0.1)
 
 
+def test_the_sky_is_the_same_by_both_kinds_of_rays(rng):
+    scene = Scene([Sphere(np.array([0, 0, 2.0]), np.array(0.5), RED)], (), rng.random((8, 16, 3)))
+    inside = jax.jit(lambda p: capture(scene, p, 8, rays="analytic").radiance)(jnp.zeros(3))
+    np.testing.assert_array_equal(inside, capture(scene, np.zeros(3), 8).radiance)
+    with pytest.raises(ValueError, match="environment must be known"):
+        jax.jit(lambda sky: capture(Scene([], (), sky), np.zeros(3), 4, rays="analytic"))(
+            jnp.ones((8, 16, 3))
+        )
+
+
 def test_an_empty_scene_is_black_and_finite():
-    for cube in (capture(Scene([]), np.zeros(3), 4), capture_analytic([], jnp.zeros(3), 64)):
+    for cube in (
+        capture(Scene([]), np.zeros(3), 4),
+        capture(Scene([]), jnp.zeros(3), 64, rays="analytic"),
+    ):
         assert not np.asarray(taylor(cube, 2, 1).terms).any()
 
 
@@ -150,7 +167,7 @@ def test_a_point_on_the_light_s_plane_sees_nothing_of_it():
     light = Polygon(rectangle([2, 0, 0], [0.5, 0, 0], [0, 0.5, 0]), WHITE)
     for cube in (
         capture(Scene([light]), np.zeros(3), 64),
-        capture_analytic([light], jnp.zeros(3), 64),
+        capture(Scene([light]), jnp.zeros(3), 64, rays="analytic"),
         capture(Scene([light]), np.array([2.0, 0, 0]), 64),
     ):
         assert np.isfinite(taylor(cube, 2, 1).terms).all()
@@ -202,7 +219,8 @@ def test_batches_dtypes_and_repeated_captures():
     cube = capture(single, points, 4)
     assert {leaf.dtype for leaf in jax.tree.leaves(cube)} == {np.dtype(np.float32)}
     assert (
-        capture_analytic(single.emitters, jnp.zeros(3, jnp.float32), 4).offset.dtype == np.float32
+        capture(single, jnp.zeros(3, jnp.float32), 4, rays="analytic").plane_distance.dtype
+        == np.float32
     )
 
 
@@ -211,7 +229,7 @@ def test_the_analytic_cube_differentiates_in_point_and_vertices():
     point = jnp.array([0.1, 0.2, -0.1])
 
     def measures(point, vertices):
-        cube = capture_analytic([Polygon(vertices, WHITE)], point, 4)
+        cube = capture(Scene([Polygon(vertices, WHITE)]), point, 4, rays="analytic")
         near = jnp.isfinite(cube.distance)
         return jnp.sum(jnp.where(near, cube.distance, 0)), jnp.sum(cube.radiance)
 
@@ -235,9 +253,16 @@ def test_refuses_what_is_no_scene_or_point(unchecked):
         Scene([], environment=np.zeros((4, 8)))
     with pytest.raises(ValueError, match="expected radiance"):
         EmissiveMesh(BOX, np.zeros((4, 3)))
+    with pytest.raises(ValueError, match="takes polygons and spheres, got Mesh"):
+        capture(Scene([], [BOX]), np.zeros(3), 4, rays="analytic")
+    with pytest.raises(ValueError, match='expected rays "embree"'):
+        capture(scene, np.zeros(3), 4, rays="embre")
     with pytest.raises(ValueError, match="points must be finite"):
         capture(scene, np.array([0, np.nan, 0]))
-    for shoot in (lambda p, r: capture(scene, p, r), lambda p, r: capture_analytic([], p, r)):
+    for shoot in (
+        lambda p, r: capture(scene, p, r),
+        lambda p, r: capture(Scene([]), p, r, rays="analytic"),
+    ):
         with pytest.raises(ValueError, match=r"expected points \(..., 3\)"):
             shoot(np.zeros(2), 4)
         with pytest.raises(ValueError, match="resolution must be an integer >= 1"):

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from lights import rectangle, surface_quadrature
 
-from jaxsh.midrange._polygon import Polygon
-from jaxsh.midrange._polygon_harmonics import polygon_harmonics, polygon_harmonics_with_gradient
+from jaxsh.midrange import (
+    Polygon,
+    polygon_harmonics,
+    polygon_harmonics_with_gradient,
+)
 
 ONE = np.ones(3)
 DEGREE = 3

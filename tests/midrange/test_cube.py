@@ -6,9 +6,11 @@ import pytest
 from cubes import random_cube
 from lights import basis_with_gradient
 
-from jaxsh.midrange._cube import RadianceCube
-from jaxsh.midrange._project_cube import project_cube_with_gradient
-from jaxsh.midrange._taylor import project_cube
+from jaxsh.midrange import (
+    RadianceCube,
+    project_cube,
+    project_cube_with_gradient,
+)
 
 
 def by_the_paper(cube, degree):
@@ -51,7 +53,7 @@ def test_is_linear_in_the_radiance(rng):
     @jax.jacrev
     def jacobians(radiance):
         return project_cube_with_gradient(
-            RadianceCube(radiance, cube.distance, cube.offset, cube.normal, cube.point), 1
+            RadianceCube(radiance, cube.distance, cube.plane_distance, cube.normal, cube.point), 1
         )
 
     values = project_cube_with_gradient(cube, 1)
@@ -77,4 +79,6 @@ def test_refuses_texels_that_make_no_cube(unchecked, rng):
                 np.zeros(3),
             )  # fmt: skip
     with pytest.raises(ValueError, match="in the same batch"):
-        RadianceCube(cube.radiance, cube.distance, cube.offset, cube.normal, np.zeros((2, 3)))
+        RadianceCube(
+            cube.radiance, cube.distance, cube.plane_distance, cube.normal, np.zeros((2, 3))
+        )

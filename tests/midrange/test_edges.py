@@ -9,10 +9,13 @@ from cubes import random_cube
 from lights import rectangle, surface_quadrature
 
 from jaxsh import harmonics
-from jaxsh.midrange._analytic import capture_analytic
+from jaxsh.midrange import (
+    Polygon,
+    Scene,
+    capture,
+    project_cube_with_gradient,
+)
 from jaxsh.midrange._edges import edge_table
-from jaxsh.midrange._polygon import Polygon
-from jaxsh.midrange._project_cube import project_cube_with_gradient
 from jaxsh.sphere import cube_map
 
 
@@ -24,7 +27,7 @@ def slow_edges(cube, degree):
     """Each pair of texels whose corners share two: a plane through both corners divides them."""
     resolution, centers = cube.resolution, np.asarray(cube.directions)
     on_cube = centers / np.abs(centers).max(axis=-1, keepdims=True)
-    normals, offsets = np.asarray(cube.normal), np.asarray(cube.offset)
+    normals, offsets = np.asarray(cube.normal), np.asarray(cube.plane_distance)
     gradient = np.zeros((3, (degree + 1) ** 2, 3))
     corners = []
     for center in on_cube:
@@ -80,8 +83,10 @@ def test_lights_that_are_partly_hidden():
     rng = np.random.default_rng(2004)
     cast = jax.jit(
         lambda light, radiance, blocker, point: project_both(
-            capture_analytic(
-                [Polygon(light, radiance)], point, blockers=[Polygon(blocker, radiance)]
+            capture(
+                Scene([Polygon(light, radiance)], [Polygon(blocker, radiance)]),
+                point,
+                rays="analytic",
             )
         )
     )
@@ -115,7 +120,9 @@ def test_one_light_that_nothing_hides(resolution, limit):
     light = rectangle([0.3, -0.2, 2], [0.6, 0.1, 0], [0, -0.5, 0.2])
     radiance, point = np.array([1.0, 2, 3]), np.array([0.1, 0.2, -0.1])
     exact, slope = surface_quadrature(light, radiance, point, 4)
-    cube = capture_analytic([Polygon(light, radiance)], jnp.asarray(point), resolution)
+    cube = capture(
+        Scene([Polygon(light, radiance)]), jnp.asarray(point), resolution, rays="analytic"
+    )
     c, surface, edge = project_both(cube)
     assert relative(c, exact) < limit
     assert relative(surface, slope) < limit
@@ -136,7 +143,7 @@ def test_edges_jit_vmap_and_float32(rng):
 
 
 def test_nothing_seen_has_no_edge_gradient():
-    cube = capture_analytic([], jnp.zeros(3), 4)
+    cube = capture(Scene([]), jnp.zeros(3), 4, rays="analytic")
     assert not edges(cube, 2).any()
 
 

@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 from near_light import expand, point_lights
 
-from jaxsh.midrange._expansion import Expansion, extrapolate, make_expansion, monomials
-from jaxsh.midrange._grid import Grid
-from jaxsh.midrange._interpolate import interpolate
-from jaxsh.midrange._weights import (
+from jaxsh.midrange import (
+    Expansion,
+    Grid,
     Weights,
+    extrapolate,
+    interpolate,
     inverse_distance_weights,
+    make_expansion,
+    monomials,
     moving_least_squares_weights,
 )
 

@@ -11,11 +11,14 @@ from near_light import expand, random_transfer
 
 from jaxsh.geometry import knot
 from jaxsh.harmonics import evaluate
-from jaxsh.midrange._expansion import Expansion, extrapolate
-from jaxsh.midrange._grid import Grid
-from jaxsh.midrange._interpolate import interpolate
-from jaxsh.midrange._shade import shade
-from jaxsh.midrange._weights import inverse_distance_weights
+from jaxsh.midrange import (
+    Expansion,
+    Grid,
+    extrapolate,
+    interpolate,
+    inverse_distance_weights,
+    shade,
+)
 from jaxsh.transfer import bake, shade_diffuse
 
 

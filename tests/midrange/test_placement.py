@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from near_light import expand
 
-from jaxsh.midrange._interpolate import interpolate
-from jaxsh.midrange._placement import place_samples
-from jaxsh.midrange._predict import Prediction, probes_of
-from jaxsh.midrange._update import update_samples
-from jaxsh.midrange._weights import inverse_distance_weights
+from jaxsh.midrange import (
+    interpolate,
+    inverse_distance_weights,
+    place_samples,
+    update_samples,
+)
+from jaxsh.midrange._placement import Prediction, probes_of
 
 
 def _light(points):

@@ -10,8 +10,11 @@ import pytest
 from lights import rectangle, surface_quadrature
 
 from jaxsh import harmonics
-from jaxsh.midrange._polygon import Polygon
-from jaxsh.midrange._polygon_harmonics import polygon_harmonics, polygon_harmonics_with_gradient
+from jaxsh.midrange import (
+    Polygon,
+    polygon_harmonics,
+    polygon_harmonics_with_gradient,
+)
 
 RADIANCE = np.array([1.0, 2, 0.5])
 

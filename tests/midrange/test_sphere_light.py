@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from jaxsh import harmonics
-from jaxsh.midrange._sphere import Sphere
-from jaxsh.midrange._sphere_harmonics import sphere_harmonics, sphere_harmonics_with_gradient
+from jaxsh.midrange import (
+    Sphere,
+    sphere_harmonics,
+    sphere_harmonics_with_gradient,
+)
 
 RADIANCE = np.array([1.0, 2, 0.5])
 

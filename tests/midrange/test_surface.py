@@ -8,10 +8,10 @@ from lights import rectangle, surface_quadrature
 
 from jaxsh import harmonics
 from jaxsh.geometry import make_mesh
-from jaxsh.midrange._emissive import EmissiveMesh
-from jaxsh.midrange._polygon import Polygon
-from jaxsh.midrange._sphere import Sphere
-from jaxsh.midrange._surface import (
+from jaxsh.midrange import (
+    EmissiveMesh,
+    Polygon,
+    Sphere,
     SurfaceSamples,
     project_surface,
     project_surface_with_gradient,

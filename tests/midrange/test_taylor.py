@@ -13,11 +13,15 @@ from cubes import moved, random_cube
 from jax.test_util import check_grads
 from lights import rectangle, surface_quadrature
 
-from jaxsh.midrange._analytic import capture_analytic
-from jaxsh.midrange._cube import RadianceCube
-from jaxsh.midrange._polygon import Polygon
-from jaxsh.midrange._project_cube import project_cube_with_gradient
-from jaxsh.midrange._taylor import project_cube, taylor
+from jaxsh.midrange import (
+    Polygon,
+    RadianceCube,
+    Scene,
+    capture,
+    project_cube,
+    project_cube_with_gradient,
+    taylor,
+)
 
 DEGREE = 3
 
@@ -84,7 +88,7 @@ def test_a_batch_is_its_cubes(rng):
 def test_third_order_beats_the_gradient_away_from_a_real_light():
     polygon = Polygon(rectangle([0.2, 0, 2], [0.6, 0, 0.1], [0, -0.5, 0]), np.array([1.0, 2, 3]))
     point, d = np.array([0.1, -0.1, 0.0]), np.array([0.2, 0.25, 0.3])
-    expansion = taylor(capture_analytic([polygon], jnp.asarray(point), 64), 4, 3)
+    expansion = taylor(capture(Scene([polygon]), jnp.asarray(point), 64, rays="analytic"), 4, 3)
     exact, _ = surface_quadrature(polygon.vertices, polygon.radiance, point + d, 4)
     errors = []
     for order in range(4):
@@ -99,12 +103,15 @@ def test_texels_at_infinity_edge_on_and_at_the_point_add_nothing_to_derivatives(
     cube = random_cube(rng, sky=0.0)
     odd = np.arange(96) % 4
     distance = jnp.where(odd == 1, jnp.inf, jnp.where(odd == 3, 0, cube.distance))
-    offset = jnp.where(odd == 1, -jnp.inf, jnp.where(odd >= 2, 0, cube.offset))
+    offset = jnp.where(odd == 1, -jnp.inf, jnp.where(odd >= 2, 0, cube.plane_distance))
     strange = RadianceCube(cube.radiance, distance, offset, cube.normal, cube.point)
     plain = RadianceCube(
-        jnp.where(odd[:, None] == 0, cube.radiance, 0), cube.distance, cube.offset, cube.normal,
+        jnp.where(odd[:, None] == 0, cube.radiance, 0),
+        cube.distance,
+        cube.plane_distance,
+        cube.normal,
         cube.point,
-    )  # fmt: skip
+    )
     terms, expected = taylor(strange, DEGREE, 2).terms, taylor(plain, DEGREE, 2).terms
     np.testing.assert_allclose(terms[..., 1:], expected[..., 1:], atol=1e-13)
     np.testing.assert_allclose(terms[..., 0], project_cube(cube, DEGREE), atol=1e-14)
@@ -114,7 +121,9 @@ def test_texels_at_infinity_edge_on_and_at_the_point_add_nothing_to_derivatives(
 
 def test_a_surface_s_two_normals_are_one(rng):
     cube = random_cube(rng)
-    turned = eqx.tree_at(lambda c: (c.normal, c.offset), cube, (-cube.normal, -cube.offset))
+    turned = eqx.tree_at(
+        lambda c: (c.normal, c.plane_distance), cube, (-cube.normal, -cube.plane_distance)
+    )
     np.testing.assert_array_equal(taylor(turned, DEGREE, 2).terms, taylor(cube, DEGREE, 2).terms)
 
 
@@ -135,7 +144,7 @@ def test_derivatives_in_the_whole_cube(rng):
     def terms(radiance, distance, offset, normal):
         return taylor(RadianceCube(radiance, distance, offset, normal, cube.point), 1, 2).terms
 
-    arguments = cube.radiance, cube.distance, cube.offset, cube.normal
+    arguments = cube.radiance, cube.distance, cube.plane_distance, cube.normal
     check_grads(terms, arguments, order=1, modes=["fwd", "rev"], rtol=1e-6, atol=1e-6)
 
 

@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from jaxsh.midrange._grid import Grid, grid_around
-from jaxsh.midrange._weights import inverse_distance_weights, moving_least_squares_weights
+from jaxsh.midrange import (
+    Grid,
+    grid_around,
+    inverse_distance_weights,
+    moving_least_squares_weights,
+)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 4.0, 5.5])

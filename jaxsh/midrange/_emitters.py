@@ -1,10 +1,11 @@
-"""A flat light."""
+"""Lights: polygons, spheres and meshes."""
 
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
 from .._core.checks import as_float, is_concrete
+from ..geometry import Mesh
 
 # A vertex may be this far out of the plane, as a share of the polygon's extent.
 _FLAT = {np.dtype(np.float64): 1e-9, np.dtype(np.float32): 1e-5}
@@ -96,3 +97,45 @@ def _meeting_edges(corners: Float[np.ndarray, "n 2"]) -> tuple[int, int] | None:
     apart = (gap > 1) & (gap < len(corners) - 1)
     found = np.argwhere(across & boxes.all(axis=-1) & apart)
     return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
+
+
+class Sphere(eqx.Module):
+    """A sphere that emits `radiance` outwards, linear RGB (3,), the same everywhere.
+
+    Raises `ValueError` for shapes that do not fit and, where values are known, for numbers that
+    are not finite and a radius that is not positive.
+    """
+
+    center: Float[Array, " 3"] = eqx.field(converter=as_float)
+    radius: Float[Array, ""] = eqx.field(converter=as_float)
+    radiance: Float[Array, " 3"] = eqx.field(converter=as_float)
+
+    def __check_init__(self):
+        for name, shape in (("center", (3,)), ("radius", ()), ("radiance", (3,))):
+            value = getattr(self, name)
+            if value.shape != shape:
+                raise ValueError(f"expected {name} of shape {shape}, got {value.shape}")
+            if is_concrete(value) and not np.isfinite(value).all():
+                raise ValueError(f"a sphere's {name} must be finite, got {value}")
+        if is_concrete(self.radius) and not self.radius > 0:
+            raise ValueError(f"a sphere's radius must be positive, got {self.radius}")
+
+
+class EmissiveMesh(eqx.Module):
+    """A mesh whose faces emit `radiance` outwards, or to both sides.
+
+    `radiance` is (3,), the same for all faces, or (F, 3). The front of a face is where its corners
+    run counter-clockwise; a one-sided face is black from behind, and blocks.
+    """
+
+    mesh: Mesh
+    radiance: Float[Array, "*faces 3"] = eqx.field(converter=as_float)
+    two_sided: bool = eqx.field(static=True, default=False)
+
+    def __check_init__(self):
+        faces = len(self.mesh.faces)
+        if self.radiance.shape not in ((3,), (faces, 3)):
+            raise ValueError(
+                f"expected radiance (3,) or one for each face ({faces}, 3), got shape "
+                f"{self.radiance.shape}"
+            )
