@@ -62,6 +62,7 @@ def run(config: Environment, context: Context) -> list[Table]:
     mesh = context.data.mesh(config.mesh or context.data.meshes()[0])
     camera = imaging.Camera.facing(mesh, width=config.size, height=config.size)
     view = View(mesh, imaging.rasterize(mesh, camera))
+    shade = jax.jit(sphere.irradiance)
     sheet = []
     names = config.environments or tuple(context.data.environments())
     for name in context.progress(names, "environments"):
@@ -75,10 +76,10 @@ def run(config: Environment, context: Context) -> list[Table]:
         for degree in config.degrees:
             project = jax.jit(functools.partial(sphere.project_lat_long, degree=degree))
             light = context.measure(f"{name}: project {degree}", project, environment).value
-            context.measure(f"{name}: shade {degree}", irradiance, light, mesh.normals)
+            context.measure(f"{name}: shade {degree}", shade, light, mesh.normals)
             for window in WINDOWS:
                 windowed, strength = _windowed(light, window)
-                shaded = irradiance(windowed, mesh.normals)
+                shaded = shade(windowed, mesh.normals)
                 image = view.render(ALBEDO / np.pi * shaded)
                 row: dict[str, Any] = {
                     "environment": name,
@@ -123,13 +124,6 @@ def direct_irradiance(
     return jax.lax.map(one, normals, batch_size=64)  # 32 MB of cosines at a time
 
 
-@jax.jit
-def irradiance(light: Float[Array, "3 k"], normals: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
-    """Irradiance at the normals: the light convolved with the clamped cosine."""
-    kernel = harmonics.clamped_cosine(harmonics.degree_of(light.shape[-1]))
-    return sphere.reconstruct(harmonics.convolve(light, kernel), normals).T
-
-
 def _windowed(
     light: Float[Array, "3 k"], window: Window
 ) -> tuple[Float[Array, "3 k"], float | None]:
@@ -137,9 +131,8 @@ def _windowed(
     degree = harmonics.degree_of(light.shape[-1])
     if window != "dering light" and window != "dering irradiance":
         return light * harmonics.window(window, degree)[None], None
-    kernel = harmonics.clamped_cosine(degree)
-    judged = light if window == "dering light" else harmonics.convolve(light, kernel)
-    strength = jnp.max(harmonics.dering(judged)[1])
+    of = "light" if window == "dering light" else "irradiance"
+    strength = jnp.max(harmonics.dering(light, of=of)[1])
     return light * harmonics.damping(strength, degree)[None], float(strength)
 
 

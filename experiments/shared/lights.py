@@ -69,6 +69,6 @@ def windowed(light: Float[Array, "3 k"], name: str) -> Float[Array, "3 k"]:
     if name == "none":
         return light
     if name == "dering":
-        strength = jnp.max(harmonics.dering(light)[1])
+        strength = jnp.max(harmonics.dering(light, of="light")[1])
         return light * harmonics.damping(strength, degree)[None]
     return light * harmonics.window(_KINDS[name], degree)[None]

@@ -81,7 +81,7 @@ def device_cache(maxsize: int):
     return decorate
 
 
-def in_blocks(function, *arrays, size: int, most: int | None = None):
+def in_blocks(function, *arrays, size: int, most: int | None = None, out: int = 0):
     """`function(*arrays)`, where rows of the leading axis do not depend on each other.
 
     On one CPU it runs block by block of `size` rows, whose intermediate values stay in cache, and
@@ -89,7 +89,7 @@ def in_blocks(function, *arrays, size: int, most: int | None = None):
     result is the same to rounding. Differentiable: each block is computed anew in reverse mode.
 
     `most` is the number of rows of one call on an accelerator, where each needs so much memory
-    that all together might not fit.
+    that all together might not fit; `out` is the axis of the rows in the results.
     """
     rows = arrays[0].shape[0]
 
@@ -100,9 +100,15 @@ def in_blocks(function, *arrays, size: int, most: int | None = None):
                 return jnp.pad(array, padding, mode="edge").reshape(-1, size, *array.shape[1:])
 
             done = jax.lax.map(lambda block: anew(*block), tuple(cut(array) for array in arrays))
-            return jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[:rows], done)
+            return jax.tree.map(join, done)
 
         return blocks
+
+    def join(blocks):
+        moved = jnp.moveaxis(blocks, 0, out)
+        joined = (moved.shape[out] * moved.shape[out + 1],)
+        shape = moved.shape[:out] + joined + moved.shape[out + 2 :]
+        return jax.lax.slice_in_dim(moved.reshape(shape), 0, rows, axis=out)
 
     if rows <= size or on_mesh(arrays):
         return function(*arrays)

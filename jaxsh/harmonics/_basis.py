@@ -17,7 +17,7 @@ from jaxtyping import Array, ArrayLike, Float, Int
 
 from .._core.checks import as_float, check_degree
 from .._core.vectors import components_first, normalize
-from .._core.xla import materialize
+from .._core.xla import materialize, on_mesh
 from ._indexing import degrees
 from ._tables import azimuth_table, gradient_table, zenith_table
 
@@ -72,6 +72,9 @@ def _checked(vectors, degree, axis):
 
 @functools.partial(jax.jit, static_argnums=(1, 2))
 def _evaluate(vectors, degree, axis):
+    if vectors.ndim > 2 and on_mesh(vectors):
+        # One batch axis at a time: two as one would lose the sharding of the second.
+        return jax.vmap(lambda v: _evaluate(v, degree, axis), out_axes=1 + axis)(vectors)
     unit, _ = normalize(components_first(vectors))
     basis = _solid(unit, degree).reshape((degree + 1) ** 2, *vectors.shape[:-1])
     return basis if axis == 0 else jnp.moveaxis(basis, 0, -1)
@@ -79,6 +82,9 @@ def _evaluate(vectors, degree, axis):
 
 @functools.partial(jax.jit, static_argnums=(1, 2))
 def _evaluate_with_gradient(vectors, degree, axis):
+    if vectors.ndim > 2 and on_mesh(vectors):
+        out = (0, 0) if axis else (1, 2)
+        return jax.vmap(lambda v: _evaluate_with_gradient(v, degree, axis), out_axes=out)(vectors)
     basis, gradient = _with_gradient(*normalize(components_first(vectors)), degree)
     shape = ((degree + 1) ** 2, *vectors.shape[:-1])
     basis, gradient = basis.reshape(shape), gradient.reshape(3, *shape)
@@ -162,13 +168,23 @@ def _derivative_along(
 def _row_by_row(row, basis: Float[Array, "k n"], *arguments):
     """All rows k of `row(k, basis, *arguments)`, which is linear in some of its arguments.
 
-    A loop, for its transpose's sake: reverse mode adds up K rows, and a loop that makes each row
-    anew from the basis does so within the cache, where XLA's reduction over all of them at once
-    is many times slower on the CPU. Vectors come as three rows: of one array with three, the
+    On the CPU a loop, for its transpose's sake: reverse mode adds up K rows, and a loop that makes
+    each row anew from the basis does so within the cache, where XLA's reduction over all of them
+    at once is many times slower. Vectors come as three rows: of one array with three, the
     transposed loop would copy all of it for each row that it adds to.
     """
-    row = jax.checkpoint(row, prevent_cse=False)
-    return jax.lax.map(lambda k: row(k, basis, *arguments), jnp.arange(len(basis), dtype=jnp.int32))
+    numbers = np.arange(len(basis), dtype=np.int32)
+
+    def in_turn(basis, *arguments):
+        once = jax.checkpoint(row, prevent_cse=False)
+        return jax.lax.map(lambda k: once(k, basis, *arguments), jnp.asarray(numbers))
+
+    # Checkpointed too: what it kept for reverse mode would be made room for on the CPU as well.
+    @functools.partial(jax.checkpoint, prevent_cse=False)
+    def at_once(basis, *arguments):
+        return jax.vmap(lambda k: row(k, basis, *arguments))(jnp.asarray(numbers))
+
+    return jax.lax.platform_dependent(basis, *arguments, cpu=in_turn, default=at_once)
 
 
 def _rows(vectors: Float[Array, "3 1 n"]) -> tuple[Float[Array, " n"], ...]:

@@ -1,18 +1,21 @@
 """The least window that leaves a light without negative values."""
 
 import functools
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import as_float, flatten_batch
+from .._core.checks import as_float
 from .._core.linalg import dot, einsum, matmul
+from .._core.xla import keep_rows
 from ._basis import evaluate
 from ._indexing import degree_of, degrees, orders
 from ._tables import legendre
 from ._windows import damping
+from ._zonal import clamped_cosine, convolve
 
 # Rounds of the search for the least strength; in each, valleys looked into and halvings.
 _CUTS, _VALLEYS, _HALVINGS = 16, 8, 60
@@ -20,6 +23,8 @@ _CUTS, _VALLEYS, _HALVINGS = 16, 8, 60
 
 def dering(
     coefficients: Float[ArrayLike, "*batch k"],
+    *,
+    of: Literal["irradiance", "light"] = "irradiance",
 ) -> tuple[Float[Array, "*batch k"], Float[Array, "*batch"]]:
     """The least `damping` that leaves a function without negative values, and its strength.
 
@@ -34,8 +39,21 @@ def dering(
     """
     coefficients = as_float(coefficients)
     degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
-    strength = jax.vmap(lambda one: _least_strength(one, degree))(flatten_batch(coefficients))
-    strength = strength.reshape(coefficients.shape[:-1])
+    if of == "irradiance":
+        judged = convolve(coefficients, clamped_cosine(degree))
+    elif of == "light":
+        judged = coefficients
+    else:
+        raise ValueError(f"of must be 'irradiance' or 'light', got {of!r}")
+
+    def least(judged):
+        if judged.ndim > 1:
+            return jax.vmap(least)(judged)
+        return _least_strength(judged, degree)
+
+    spec = (*jax.typeof(judged).sharding.spec, *[None] * judged.ndim)[: judged.ndim]
+    rows = next((axis for axis, name in enumerate(spec) if name is not None), 0)
+    strength = keep_rows(least, judged, like=judged, axis=rows, out=rows)
     return coefficients * damping(strength, degree), strength
 
 
@@ -87,7 +105,10 @@ def _search(
         raised = jnp.where(negative, _root(bands, strength), strength)
         return raised, jnp.where(negative, direction, decisive)
 
-    start = (jnp.zeros((), coefficients.dtype), jnp.eye(3, dtype=coefficients.dtype)[2])
+    # Both made of the coefficients, so that inside `shard_map` they vary over the devices as the
+    # loop's results do.
+    zero = jnp.where(jnp.isnan(coefficients[0]), 0, 0).astype(coefficients.dtype)
+    start = (zero, zero + jnp.eye(3, dtype=coefficients.dtype)[2])
     strength, direction = jax.lax.fori_loop(0, _CUTS, cut, start)
     # No comparison with NaN is true, which must not pass for "nothing is dark".
     return jnp.where(jnp.isfinite(coefficients).all(), strength, jnp.nan), direction
@@ -132,7 +153,7 @@ def _darkest(coefficients: Float[Array, " k"], degree: int) -> Float[Array, " 3"
     row = jnp.minimum(ring, samples)
     above, below = jnp.concatenate([row[:1], row[:-1]]), jnp.concatenate([row[1:], row[-1:]])
     valley = samples <= jnp.minimum(ring, jnp.minimum(above, below))
-    _, lowest = jax.lax.top_k(-jnp.where(valley, samples, jnp.inf).ravel(), _VALLEYS)
+    lowest = _least(jnp.where(valley, samples, jnp.inf).ravel(), _VALLEYS)
     polar = jnp.asarray(theta, dtype)[lowest // len(phi)]
     around = jnp.asarray(phi, dtype)[lowest % len(phi)]
     starts = jnp.stack(
@@ -140,6 +161,17 @@ def _darkest(coefficients: Float[Array, " k"], degree: int) -> Float[Array, " 3"
     )
     directions, values = _refine(coefficients, starts, degree, reach=float(theta[0]))
     return directions[jnp.argmin(values)]
+
+
+def _least(values: Float[Array, " n"], count: int) -> Int[Array, " count"]:
+    """Indices of the `count` least values, one after the other: `top_k` would gather a batch."""
+    places = np.arange(len(values), dtype=np.int32)
+
+    def take(values, _):
+        least = jnp.argmin(values).astype(jnp.int32)
+        return jnp.where(places == least, jnp.inf, values), least
+
+    return jax.lax.scan(take, values, length=count)[1]
 
 
 def _refine(

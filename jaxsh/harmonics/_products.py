@@ -15,11 +15,13 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import align, as_float, check_batches, check_degree, flatten_batch
 from .._core.host import read_only_cache
 from .._core.linalg import matmul
+from .._core.xla import in_blocks, on_mesh
 from ._indexing import degree_of, num_coefficients
 from ._tables import exact_grid
 
-# Functions per pass of `product`: their samples stay in cache.
-_BLOCK = 1024
+# Functions per pass of `product`: on a CPU their samples stay in cache, on an accelerator they are
+# under 1 GB at degree 10.
+_BLOCK, _LARGE = 1024, 2**18
 
 
 def gaunt(degree: int) -> Float[Array, "k k k"]:
@@ -92,16 +94,16 @@ def _product(f, g, degree: int):
     basis = jnp.asarray(grid.basis, f.dtype)
     project = jnp.asarray((grid.basis * grid.weights)[: num_coefficients(degree)].T, f.dtype)
 
-    def multiply(pair):
-        samples = (_matmul(one, basis[: one.shape[-1]]) for one in pair)
-        return _matmul(next(samples) * next(samples), project)
+    def multiply(f, g):
+        samples = matmul(f, basis[: f.shape[-1]]) * matmul(g, basis[: g.shape[-1]])
+        return matmul(samples, project)
 
     batch = jnp.broadcast_shapes(f.shape[:-1], g.shape[:-1])
     pair = tuple(jnp.broadcast_to(one, (*batch, one.shape[-1])) for one in (f, g))
-    if math.prod(batch) <= _BLOCK:
-        return multiply(pair)
-    rows = jax.tree.map(flatten_batch, pair)
-    return jax.lax.map(multiply, rows, batch_size=_BLOCK).reshape(*batch, project.shape[-1])
+    if math.prod(batch) <= _BLOCK or on_mesh(pair):
+        return multiply(*pair)
+    rows = in_blocks(multiply, *map(flatten_batch, pair), size=_BLOCK, most=_LARGE)
+    return rows.reshape(*batch, project.shape[-1])
 
 
 @functools.partial(jax.jit, static_argnums=1)
@@ -109,14 +111,9 @@ def _product_matrix(f, degree: int):
     f_degree = degree_of(f.shape[-1])
     grid = exact_grid(f_degree + 2 * degree, max(f_degree, degree))
     basis = jnp.asarray(grid.basis, f.dtype)
-    samples = _matmul(f, jnp.asarray(grid.basis[: f.shape[-1]] * grid.weights, f.dtype))
+    samples = matmul(f, jnp.asarray(grid.basis[: f.shape[-1]] * grid.weights, f.dtype))
     basis = basis[: num_coefficients(degree)]
-    return _matmul(jnp.multiply(*align(samples[..., None, :], basis)), basis.T)
-
-
-def _matmul(a, b):
-    # On GPUs and TPUs the default would round the inputs to half their digits.
-    return matmul(a, b)
+    return matmul(jnp.multiply(*align(samples[..., None, :], basis)), basis.T)
 
 
 def _checked_pair(f: ArrayLike, g: ArrayLike):

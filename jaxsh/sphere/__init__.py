@@ -1,7 +1,7 @@
 """The sphere: quadratures, lat-long pictures, and the way from functions to coefficients."""
 
 from ._lat_long import project_lat_long, reconstruct_lat_long
-from ._project import project, reconstruct
+from ._project import irradiance, project, reconstruct
 from ._quadrature import Quadrature, cube_map, fibonacci, gauss_legendre, lat_long
 
 __all__ = [
@@ -9,6 +9,7 @@ __all__ = [
     "cube_map",
     "fibonacci",
     "gauss_legendre",
+    "irradiance",
     "lat_long",
     "project",
     "project_lat_long",

@@ -13,6 +13,7 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import as_float, check_degree, check_size
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
+from .._core.xla import keep_rows
 from ..harmonics import degree_of, degrees, index, legendre, orders
 from ._quadrature import fejer_weights
 
@@ -58,8 +59,15 @@ def _project(image, degree: int):
     height, width, _ = image.shape
     meridians, azimuths = _tables(height, width, degree)
     weights = fejer_weights(height) * 2 * np.pi / width
-    along_rows = einsum("hwc,mw->mhc", image, azimuths.astype(image.dtype))
-    padded = einsum("mhc,mlh->cml", along_rows, (meridians * weights).astype(image.dtype))
+
+    def sums(image):
+        along_rows = einsum("hwc,mw->mhc", image, azimuths.astype(image.dtype))
+        return einsum("mhc,mlh->cml", along_rows, (meridians * weights).astype(image.dtype))
+
+    def over_columns(image):
+        return keep_rows(sums, image, like=image, axis=1, out=None)
+
+    padded = keep_rows(over_columns, image, like=image, axis=0, out=None)
     l, m = degrees(degree), orders(degree)
     return padded[:, m + degree, l]
 

@@ -1,31 +1,53 @@
-"""From samples to coefficients and back, in blocks: the basis is never held as a whole.
+"""From samples to coefficients and back, and to irradiance: the basis is never held as a whole.
 
-A block's basis is multiplied while it is still in cache, and there is never more of it in memory.
+On the CPU a block's basis is multiplied while it is still in cache; on an accelerator blocks are as
+large as memory allows, mostly all at once.
 """
 
 import functools
+import math
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_degree, flatten_batch
-from .._core.linalg import matmul
-from ..harmonics import degree_of, evaluate
+from .._core.checks import align, as_float, check_degree, flatten_batch
+from .._core.linalg import einsum, matmul
+from .._core.xla import in_blocks, keep_rows, on_mesh
+from ..harmonics import clamped_cosine, convolve, degree_of, evaluate
 from ._quadrature import Quadrature
 
-# Directions per block: 1 MB of basis at degree 10 in float32.
+# Directions per block on a CPU: 1 MB of basis at degree 10 in float32.
 _BLOCK = 2048
+# Bytes of basis per block on an accelerator.
+_LARGE = 2**28
 
 
 def project(
     values: Float[ArrayLike, "*batch n"], quadrature: Quadrature, degree: int
 ) -> Float[Array, "*batch k"]:
-    """Coefficients ∫ f y_i dω of a function sampled at the directions of a quadrature.
+    """Project a function, sampled at the directions of a quadrature, onto the basis: ∫ f y_i dω.
 
-    `values` are (..., N), one per direction; the result is (..., K) in their dtype. As exact as
-    the quadrature is for f·y_i. Linear in the values, differentiable in everything, also in
-    reverse without holding the basis. Raises `ValueError` where N is not the quadrature's.
+    **Arguments**
+
+    - `values`: (..., N), one per direction.
+    - `quadrature`: N directions and weights.
+    - `degree`: the largest l, known at trace time.
+
+    **Returns** coefficients (..., K), K = (degree+1)², in the dtype of `values`: as exact as the
+    quadrature is for f·y_i. Linear in the values; differentiable in values, directions and
+    weights, forward and reverse, and in reverse too without holding the basis. Values sharded
+    over the directions are summed where they lie. Raises `ValueError` where N is not the
+    quadrature's.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import sphere
+    >>> quadrature = sphere.gauss_legendre(degree=2)
+    >>> c = sphere.project(quadrature.directions[:, 2], quadrature, degree=1)  # f = z
+    >>> round(float(c[2]), 3)  # √(4π/3)
+    2.047
     """
     values = as_float(values)
     count = len(quadrature.weights)
@@ -39,9 +61,24 @@ def project(
 def reconstruct(
     coefficients: Float[ArrayLike, "*batch k"], directions: Float[ArrayLike, "n 3"]
 ) -> Float[Array, "*batch n"]:
-    """Values f(ω_n) = Σ_i c_i y_i(ω_n) at given directions: (..., K), (N, 3) -> (..., N).
+    """Evaluate functions, given by coefficients, at directions: f(ω_n) = Σ_i c_i y_i(ω_n).
 
-    Differentiable in both, in reverse too without holding the basis.
+    **Arguments**
+
+    - `coefficients`: (..., K).
+    - `directions`: (N, 3), nonzero, of any length.
+
+    **Returns** values (..., N), in the dtype of the coefficients. Differentiable in both, to every
+    order, and in reverse too without holding the basis. A zero direction gives NaN. Raises
+    `ValueError` where K is not a square and for directions of another shape.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import sphere
+    >>> c = jnp.zeros((3, 4))  # three functions of degree 1
+    >>> sphere.reconstruct(c, sphere.fibonacci(5).directions).shape
+    (3, 5)
     """
     coefficients, directions = as_float(coefficients), as_float(directions)
     if directions.ndim != 2 or directions.shape[-1] != 3:
@@ -50,41 +87,134 @@ def reconstruct(
     return _reconstruct(coefficients, directions)
 
 
+def irradiance(
+    light: Float[ArrayLike, "*lights k"], normals: Float[ArrayLike, "*points 3"]
+) -> Float[Array, "..."]:
+    """Light surfaces that nothing shadows: irradiance E(n) = ∫ L(ω) max(0, n·ω) dω at normals n.
+
+    E(n) = Σ_lm λ_l L_lm y_lm(n) with the clamped cosine's λ_l = π, 2π/3, π/4, 0, −π/24, …
+    (Ramamoorthi & Hanrahan 2001, eq. 7, there A_l), for lights of any degree. Beyond degree 2 the
+    λ_l are small: nine coefficients carry nearly all of the irradiance of real light.
+
+    **Arguments**
+
+    - `light`: coefficients (C, K) in C channels, shared by all normals, or with more axes
+      (..., C, K), which broadcast against those of the normals: (V, C, K) is one light for each
+      of V normals, (B, 1, C, K) a batch of shared ones. One channel may also come as (K,).
+    - `normals`: (..., 3), nonzero, of any length: E(n/|n|) is meant.
+
+    **Returns** irradiance (..., C), or (...) for a light (K,), in the dtype of the light. A
+    diffuse surface leaves albedo/π times it. Linear in the light; differentiable in both to every
+    order, forward and reverse, with the gradient in a normal tangential to it. A zero normal gives
+    NaN. A light that rings may give values below zero: see `harmonics.dering`. Raises `ValueError`
+    where K is not a square, the normals have no three components or leading axes do not broadcast.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import sphere
+    >>> light = jnp.zeros((3, 9)).at[:, 0].set(3.5449077)  # radiance 1 everywhere: √(4π)
+    >>> E = sphere.irradiance(light, jnp.array([[0.0, 0.0, 1.0], [1.0, 1.0, 0.0]]))
+    >>> E.shape, round(float(E[1, 0]), 3)
+    ((2, 3), 3.142)
+    """
+    light, normals = as_float(light), as_float(normals)
+    if normals.ndim == 0 or normals.shape[-1] != 3:
+        raise ValueError(f"expected normals (..., 3) with x, y, z last, got shape {normals.shape}")
+    degree_of(light.shape[-1] if light.ndim else 0)
+    if light.ndim == 1:
+        return _irradiance(light[None], normals)[..., 0]
+    try:
+        jnp.broadcast_shapes(light.shape[:-2], normals.shape[:-1])
+    except ValueError:
+        raise ValueError(
+            f"leading axes must broadcast, got light {light.shape}, where they stand before "
+            f"channels and coefficients, and normals {normals.shape}"
+        ) from None
+    return _irradiance(light, normals)
+
+
 @functools.partial(jax.jit, static_argnums=2)
 def _project(values, quadrature, degree: int):
     weighted = flatten_batch(values) * quadrature.weights.astype(values.dtype)[None]
-    directions = _blocks(quadrature.directions.astype(values.dtype), pad=(0, 0, 1))
-    blocks = _blocks(weighted.T, pad=(0,) * len(weighted))
+    directions = quadrature.directions.astype(values.dtype)
 
-    @jax.checkpoint  # in reverse too, evaluate a block again rather than hold all of them
-    def add(total, block):
-        directions, values = block
-        basis = evaluate(directions, degree, axis=0)
-        return total + matmul(basis, values), None
+    def whole(directions, weighted):
+        return matmul(evaluate(directions, degree, axis=0), weighted.T)
 
-    start = jnp.zeros(((degree + 1) ** 2, len(weighted)), values.dtype)
-    total, _ = jax.lax.scan(add, start, (directions, blocks))
+    def streamed(size, directions, weighted):
+        if len(directions) <= size:
+            return whole(directions, weighted)
+
+        @jax.checkpoint  # in reverse too, evaluate a block again rather than hold all of them
+        def add(total, block):
+            directions, rows = block
+            return total + matmul(evaluate(directions, degree, axis=0), rows), None
+
+        start = jnp.zeros(((degree + 1) ** 2, len(weighted)), values.dtype)
+        blocks = (
+            _blocks(directions, size, pad=(0, 0, 1)),
+            _blocks(weighted.T, size, pad=(0,) * len(weighted)),
+        )
+        total, _ = jax.lax.scan(add, start, blocks)
+        return total
+
+    if len(directions) <= _BLOCK or on_mesh(values, quadrature):
+        total = keep_rows(whole, directions, weighted, like=weighted, axis=1, out=None)
+    else:
+        total = jax.lax.platform_dependent(
+            directions,
+            weighted,
+            cpu=functools.partial(streamed, _BLOCK),
+            default=functools.partial(streamed, _large_block(degree, values.dtype)),
+        )
     return total.T.reshape(*values.shape[:-1], len(total))
 
 
 @jax.jit
 def _reconstruct(coefficients, directions):
-    degree = degree_of(coefficients.shape[-1])
-    rows = flatten_batch(coefficients)
+    values = _values(flatten_batch(coefficients), directions)
+    return values.reshape(*coefficients.shape[:-1], len(directions))
 
-    @jax.checkpoint
+
+@jax.jit
+def _irradiance(light, normals):
+    degree = degree_of(light.shape[-1])
+    lit = convolve(light, clamped_cosine(degree))
+    points, channels = normals.shape[:-1], light.shape[-2]
+    aligned = max(0, light.ndim - 2 - len(points))
+    if math.prod(light.shape[aligned:-2]) == 1:  # all normals share each light
+        lights = light.shape[:aligned]
+        rows = flatten_batch(lit)
+        if len(points) > 1 and on_mesh(normals):  # flat, normals would lose their sharding
+            basis = evaluate(normals.astype(light.dtype), degree, axis=0)
+            values = einsum("bk,k...->b...", rows, basis)
+        else:
+            values = _values(rows, normals.reshape(-1, 3))
+        values = values.reshape(*lights, channels, *points)
+        return jnp.moveaxis(values, len(lights), -1)
+    basis = evaluate(normals.astype(light.dtype), degree)
+    return jnp.sum(jnp.multiply(*align(lit, basis[..., None, :])), axis=-1)
+
+
+def _values(rows: Float[Array, "b k"], directions: Float[Array, "n 3"]) -> Float[Array, "b n"]:
+    degree = degree_of(rows.shape[-1])
+
     def block(directions):
-        basis = evaluate(directions.astype(rows.dtype), degree, axis=0)
-        return matmul(rows, basis)
+        return matmul(rows, evaluate(directions, degree, axis=0))
 
-    blocks = jax.lax.map(block, _blocks(directions, pad=(0, 0, 1)))
-    values = jnp.moveaxis(blocks, 0, 1).reshape(len(rows), blocks.shape[0] * blocks.shape[-1])
-    return values[:, : len(directions)].reshape(*coefficients.shape[:-1], len(directions))
+    most = _large_block(degree, rows.dtype)
+    return in_blocks(block, directions.astype(rows.dtype), size=_BLOCK, most=most, out=1)
 
 
-def _blocks(rows: Float[Array, "n c"], pad: tuple[int, ...]) -> Float[Array, "blocks size c"]:
+def _large_block(degree: int, dtype) -> int:
+    return max(_BLOCK, _LARGE // ((degree + 1) ** 2 * dtype.itemsize))
+
+
+def _blocks(
+    rows: Float[Array, "n c"], size: int, pad: tuple[int, ...]
+) -> Float[Array, "blocks size c"]:
     """Rows in blocks of equal size, the last one filled up with rows of `pad`."""
-    size = max(1, min(_BLOCK, len(rows)))
     missing = -len(rows) % size
     filler = jnp.broadcast_to(jnp.asarray(pad, rows.dtype), (missing, len(pad)))
     filled = jnp.concatenate([rows, filler])

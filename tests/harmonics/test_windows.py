@@ -103,14 +103,13 @@ def slow_strength(c):
     return high
 
 
-@jax.jit
-def compiled(c):
-    return harmonics.dering(c)
+dering_of_light = functools.partial(harmonics.dering, of="light")
+compiled = functools.partial(jax.jit, static_argnames="of")(harmonics.dering)
 
 
-def dering(c):
+def dering(c, of="light"):
     """To NumPy, so that nothing but one program per shape is compiled."""
-    return tuple(np.asarray(a) for a in compiled(c))
+    return tuple(np.asarray(a) for a in compiled(c, of=of))
 
 
 def lights(rng, degree, count=8):
@@ -161,9 +160,64 @@ def test_dering_of_a_zonal_function_by_hand():
     """1 + b cos θ is positive once 4 strength = b - 1 or more; the grid need not hold the pole."""
     c = np.zeros(4)
     c[0], c[2] = np.sqrt(4 * np.pi), 3.0 * np.sqrt(4 * np.pi / 3)
-    clean, strength = harmonics.dering(c)
+    clean, strength = dering_of_light(c)
     assert strength == pytest.approx(0.5, rel=1e-2)
     assert clean[2] == pytest.approx(np.sqrt(4 * np.pi / 3), rel=1e-2)
+
+
+def irradiance_of(c):
+    return np.asarray(
+        harmonics.convolve(c, harmonics.clamped_cosine(harmonics.degree_of(c.shape[-1])))
+    )
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_dering_of_irradiance_is_the_default(dtype, rng):
+    """Enough for a surface, and no more; the light itself may stay negative."""
+    c = lights(rng, 3).astype(dtype)
+    c[8:16] -= 0.5 * np.eye(16)[0].astype(dtype)  # darker, so that irradiance is negative too
+    clean, strength = (np.asarray(a) for a in jax.jit(harmonics.dering)(c))
+    assert clean.dtype == strength.dtype == dtype
+    assert darkest(irradiance_of(clean)).min() >= -1e-3
+    assert (darkest(clean)[strength < np.inf] < -0.01).any()
+    some = np.flatnonzero((strength > 0) & (strength < np.inf))
+    assert len(some) >= 8
+    less = c[some] * np.asarray(harmonics.damping(0.97 * strength[some], 3))
+    assert (darkest(irradiance_of(less)) < 0).all()
+    error = 2e-2 if dtype == "float64" else 3e-2
+    for i in some[::4]:
+        assert strength[i] == pytest.approx(slow_strength(irradiance_of(c[i])), rel=error)
+    np.testing.assert_allclose(clean, c * np.asarray(harmonics.damping(strength, 3)), 1e-5)
+
+
+def test_dering_of_irradiance_by_hand():
+    """1 + b cos θ gives π (1 + 2b/3 cos θ): 4 strength = 2b/3 - 1. Odd bands above 1 give none."""
+    c = np.zeros((2, 16))
+    c[:, 0] = np.sqrt(4 * np.pi)
+    c[0, 2] = 3.0 * np.sqrt(4 * np.pi / 3)
+    c[1, 9:] = 5.0
+    clean, strength = harmonics.dering(c)
+    np.testing.assert_allclose(strength, [0.25, 0], 1e-2)
+    assert clean[0, 2] == pytest.approx(1.5 * np.sqrt(4 * np.pi / 3), rel=1e-2)
+    np.testing.assert_array_equal(clean[1], c[1])
+
+
+def test_dering_of_irradiance_derivatives(rng):
+    """Through the convolution, forward and reverse."""
+    (source,) = oracles.unit_vectors(rng, 1)
+    c = np.asarray(harmonics.evaluate(source, 3)) + 0.05 * rng.normal(size=16)
+    c[0] /= 3
+    tangents = rng.normal(size=(24, 16))
+    around = {t: dering(c + t * tangents, "irradiance")[1] for t in (-2e-5, -1e-5, 1e-5, 2e-5)}
+    expected = oracles.slope(around.__getitem__, 1e-5)
+    gradient = jax.jit(jax.grad(lambda c: harmonics.dering(c)[1]))(c)
+    assert np.abs(expected).max() > 0.01
+    np.testing.assert_allclose(tangents @ np.asarray(gradient), expected, 1e-4, 1e-8)
+
+
+def test_dering_of_what_is_one_of_two(unchecked):
+    with pytest.raises(ValueError, match="of must be 'irradiance' or 'light', got 'shadow'"):
+        harmonics.dering(np.ones(4), of="shadow")
 
 
 def test_dering_leaves_the_rest_alone(rng):
@@ -177,7 +231,7 @@ def test_dering_leaves_the_rest_alone(rng):
     assert strength[:3].tolist() == [0, 0, 0]
     np.testing.assert_array_equal(clean[:3], c[:3])
     assert (strength[3:] > 0).any()
-    constant, strength = harmonics.dering(np.array([[2.0], [0.0], [-1.0]]))
+    constant, strength = dering_of_light(np.array([[2.0], [0.0], [-1.0]]))
     assert constant.tolist() == [[2.0], [0.0], [-1.0]]
     assert strength.tolist() == [0, 0, np.inf]
 
@@ -185,7 +239,7 @@ def test_dering_leaves_the_rest_alone(rng):
 @jax.jit
 def slopes(c, tangent, pull, pull_strength):
     """Forward, and reverse, as `jax.vjp` has it: one search for both."""
-    _, forward = jax.linearize(harmonics.dering, c)
+    _, forward = jax.linearize(dering_of_light, c)
     (reverse,) = jax.linear_transpose(forward, c)((pull, pull_strength))
     return forward(tangent), reverse
 
@@ -256,27 +310,27 @@ def test_dering_refuses_second_derivatives(inner, outer):
     """Rather than a wrong one: the darkest direction moves, which a first derivative ignores."""
     c = np.asarray(harmonics.evaluate(np.array([0.0, 0.6, 0.8]), 1))
     with pytest.raises(NotImplementedError, match="first derivatives only"):
-        jax.eval_shape(outer(inner(lambda c: harmonics.dering(c)[1])), c)
+        jax.eval_shape(outer(inner(lambda c: dering_of_light(c)[1])), c)
 
 
 def test_dering_batches_jit_and_vmap(rng):
     c = lights(rng, 1).reshape(8, 3, 4)
-    clean, strength = map(np.asarray, harmonics.dering(c))
+    clean, strength = map(np.asarray, dering_of_light(c))
     assert darkest(clean).min() >= -1e-3
     assert (clean.shape, strength.shape) == ((8, 3, 4), (8, 3))
-    again, strength_again = jax.jit(jax.vmap(harmonics.dering))(c)
+    again, strength_again = jax.jit(jax.vmap(dering_of_light))(c)
     np.testing.assert_allclose(again, clean, 0, 1e-13)
     np.testing.assert_allclose(strength_again, strength, 1e-12)
-    one, strength_one = harmonics.dering(c[2, 1])
+    one, strength_one = dering_of_light(c[2, 1])
     np.testing.assert_allclose(one, clean[2, 1], 0, 1e-13)
     np.testing.assert_allclose(strength_one, strength[2, 1], 1e-12)
-    assert harmonics.dering(np.zeros((0, 9)))[0].shape == (0, 9)
+    assert dering_of_light(np.zeros((0, 9)))[0].shape == (0, 9)
 
 
 def test_dering_refuses_what_is_no_function(unchecked):
     for bad, count in ((np.ones(8), 8), (1.0, 0)):
         with pytest.raises(ValueError, match=rf"1, 4, 9, 16.*got {count}"):
-            harmonics.dering(bad)
+            dering_of_light(bad)
 
 
 def test_dering_of_nan_is_nan():
