@@ -68,7 +68,7 @@ def _rows(
             "gain_einsum": times["einsum"] / spent,
         }
         line["kept"] = None
-        if "specular" in result.kept:
-            line["kept"] = float(np.ravel(np.asarray(result.kept["specular"]))[-1])
+        if "specular" in result.active_fraction:
+            line["kept"] = float(np.ravel(np.asarray(result.active_fraction["specular"]))[-1])
         line |= scene.quality(color(result), reference).named()
         yield line | rival(spent, times, truncated)

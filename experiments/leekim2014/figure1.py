@@ -62,14 +62,14 @@ def figure1(config: Figure1, context: Context) -> Table:
 def shadings(scene: Scene, look: Look) -> Iterator[Shading]:
     """By the paper's filter alone and with all that follows it, and by its rivals."""
     thresholds = {"threshold": look.threshold, "diffuse_threshold": look.diffuse_threshold}
-    everything = {"outside": "base", "rings": len(scene.baked.positions), "smoothing": True}
+    everything = {"fallback": "base", "rings": len(scene.baked.positions), "smoothing": True}
     readings: dict[str, dict[str, Any]] = {FILTER: {}, WHOLE: everything}
     for name, options in readings.items():
         result = adaptive_way(scene, "levels", **thresholds, **options)(scene.light)
-        inside = float(jnp.mean(result.reached["specular"] == scene.row.degree))
-        yield Shading(name, result.color, result.reached, inside, float(result.spent))
+        inside = float(jnp.mean(result.shown_degree["specular"] == scene.row.degree))
+        yield Shading(name, result.color, result.shown_degree, inside, float(result.relative_cost))
     result = adaptive_way(scene, "tiles")(scene.light)
-    yield Shading(TILES, result.color, {}, spent=float(result.spent))
+    yield Shading(TILES, result.color, {}, spent=float(result.relative_cost))
     degree = max(BASE, round(0.7 * scene.row.degree))
     share = _share(degree, scene.row.degree)
     yield Shading(f"everyone at degree {degree}", truncated(scene, degree), {}, spent=share)

@@ -28,7 +28,7 @@ class Figure10(Look):
     frames: int = 24
     step: float = 2.0
     """degrees from frame to frame"""
-    leave: float = 0.5
+    hysteresis: float = 0.5
     """hysteresis: thresholds of those inside are so many times as high"""
     windows: tuple[Window, ...] = ("none", "sinc", "dering")
     """of the light, against ringing; the first is in the pictures"""
@@ -41,8 +41,8 @@ class Figure10(Look):
         super().__post_init__()
         if not 2 <= self.sheet <= self.frames:
             raise ValueError("sheet must be at least 2, frames at least sheet")
-        if not self.windows or not 0 < self.leave <= 1 or self.views < 1:
-            raise ValueError("windows one or more, leave above 0 and at most 1, views at least 1")
+        if not self.windows or not 0 < self.hysteresis <= 1 or self.views < 1:
+            raise ValueError("windows one or more, hysteresis above 0, at most 1, views at least 1")
 
 
 @experiment("leekim2014.figure10")
@@ -53,7 +53,9 @@ def figure10(config: Figure10, context: Context) -> Table:
     angles = np.radians(config.step) * np.arange(config.frames)
     thresholds = {"threshold": config.threshold, "diffuse_threshold": config.diffuse_threshold}
     with context.time("probes, stages and tiles"):
-        ways = list(methods(scene, thresholds=thresholds, leave=config.leave, views=config.views))
+        ways = list(
+            methods(scene, thresholds=thresholds, hysteresis=config.hysteresis, views=config.views)
+        )
     curves: dict[str, list[dict[str, float]]] = {}
     shown: dict[str, list[Frame]] = {}
     seen: list[Scene] = []

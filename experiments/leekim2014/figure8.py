@@ -76,8 +76,9 @@ def _diffuse(scene: Scene, degree: int) -> Float[Array, "v 3"]:
 def _kept(scene: Scene, config: Figure8) -> dict[int, float]:
     """Shares that the paper's filter keeps after each level."""
     frame = scene.light, scene.baked, scene.eye, scene.material
-    result = adaptive.shade_levels(*frame, diffuse_threshold=config.diffuse_threshold)
-    shares = np.asarray(result.kept["diffuse"])
+    method = adaptive.Levels(diffuse_threshold=config.diffuse_threshold)
+    result = adaptive.shade(*frame, method)
+    shares = np.asarray(result.active_fraction["diffuse"])
     return dict(zip(range(_BASE + 1, scene.row.degree + 1), map(float, shares), strict=True))
 
 

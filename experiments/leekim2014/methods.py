@@ -19,6 +19,7 @@ from ..runner import Context
 from ..shared.timing import bursts
 from .scenes import Quality, Scene
 
+# "probes" are the anchors of `adaptive`: the tables keep the name under which they began.
 Method = Literal["masks", "levels", "two_stage", "probes", "tiles"]
 METHODS: tuple[Method, ...] = get_args(Method)
 FILTERS = "masks", "levels", "two_stage"
@@ -60,27 +61,25 @@ def diffuse(scene: Scene) -> dict[str, Way]:
 
 def adaptive_way(scene: Scene, method: Method, **options: Any) -> Way:
     """A frame by one of the methods, with what it needs made; gives an `AdaptiveResult`."""
-    baked: transfer.Transfer | transfer.QuantizedTransfer | adaptive.StagedTransfer = scene.baked
+    baked: transfer.AbstractTransfer = scene.baked
     if method in FILTERS:
-        options = {
-            "threshold": THRESHOLD,
-            "diffuse_threshold": DIFFUSE_THRESHOLD,
-            # At degree 2 the paper's base leaves nothing to add.
-            "base": min(2, scene.row.degree - 1),
-        } | options
-    if method == "two_stage":
-        baked = adaptive.stage(scene.baked, scene.row.degree, base=options["base"])
+        # At degree 2 the paper's base leaves nothing to add.
+        base = min(2, scene.row.degree - 1)
+        options = {"threshold": THRESHOLD, "base": base} | options
+        if method == "two_stage":
+            options.pop("diffuse_threshold", None)  # it decides on the glossy part alone
+            baked = adaptive.stage(scene.baked, scene.row.degree, base=options["base"])
+            made = adaptive.TwoStage(**options)
+        else:
+            options = {"diffuse_threshold": DIFFUSE_THRESHOLD} | options
+            made = {"masks": adaptive.Masks, "levels": adaptive.Levels}[method](**options)
     elif method == "probes":
-        baked = transfer.quantize(scene.baked)
-        options = {"probes": adaptive.make_probes(scene.baked)} | options
-    elif method == "tiles":
-        baked = transfer.quantize(scene.baked)
+        made = adaptive.Anchors(adaptive.make_anchors(scene.baked), **options)
+    else:
         exponent = float(scene.material.exponent)
-        made = adaptive.make_tiles(scene.baked, scene.eye, exponent=exponent)
-        options = {"tiles": made} | options
-    return lambda light: adaptive.shade(
-        light, baked, scene.eye, scene.material, method=method, **options
-    )
+        tiles = adaptive.make_tiles(scene.baked, scene.eye, exponent=exponent)
+        made = adaptive.Tiles(tiles, **options)
+    return lambda light: adaptive.shade(light, baked, scene.eye, scene.material, made)
 
 
 def truncations(scene: Scene) -> dict[str, Way]:

@@ -1,5 +1,6 @@
 """Light and eye both move: tiles that follow the eye, against the full computation."""
 
+import dataclasses
 import functools
 import statistics
 from typing import Any
@@ -29,16 +30,14 @@ def moving(context: Context, scene: Scene, frames: int, views: int, step: float)
     atlas, made = timed(make, scene.baked)
     prepared = adaptive.TileFollower(atlas, scene.baked, path[0])
     sets, prepared_in = timed(prepared.prepare, jnp.stack(path))
-    sampled, quantized = transfer.sample(scene.baked), transfer.quantize(scene.baked)
+    sampled = transfer.sample(scene.baked)
 
     def full(light, eye):
         return transfer.shade_glossy(light, sampled, eye, scene.material)
 
     def tiles(follow):
         def way(light, eye):
-            return adaptive.shade(
-                light, quantized, eye, scene.material, method="tiles", tiles=follow(eye)
-            ).color
+            return follow(eye)(light, eye, scene.material).color
 
         return way
 
@@ -63,7 +62,10 @@ def moving(context: Context, scene: Scene, frames: int, views: int, step: float)
     mid = {name: statistics.median(times) for name, times in taken.items()}
     mean = {name: statistics.mean(times) for name, times in taken.items()}
     row = scene.row._asdict() | {f"moving_{name}_ms": 1e3 * mid[name] for name in ways}
-    size = sum(leaf.nbytes for leaf in jax.tree.leaves(prepared(path[0])))
+    tiles = prepared(path[0])
+    parts = (getattr(tiles, field.name) for field in dataclasses.fields(tiles))
+    own = [part for part in parts if part is not tiles.diffuse]  # which all sets share
+    size = sum(leaf.nbytes for leaf in jax.tree.leaves(own))
     return row | {
         "moving_gain": mid["full"] / mid["prepared"],
         "moving_gain_mean": mean["full"] / mean["prepared"],

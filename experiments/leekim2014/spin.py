@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsh import adaptive, harmonics, transfer
-from jaxsh.adaptive import AdaptiveResult, make_probes, make_tile_atlas
+from jaxsh.adaptive import AdaptiveResult, make_anchors, make_tile_atlas
 
 from .scenes import Scene
 
@@ -52,50 +52,53 @@ def spun(scene: Scene, angle: float) -> Scene:
 
 
 def methods(
-    scene: Scene, *, thresholds: dict[str, float], leave: float, views: int
+    scene: Scene, *, thresholds: dict[str, float], hysteresis: float, views: int
 ) -> Iterator[Method]:
     """All but masks, which give the colours of levels."""
     staged = adaptive.stage(scene.baked)
-    probes = make_probes(scene.baked)
-    centre = (jnp.max(scene.baked.positions, axis=0) + jnp.min(scene.baked.positions, axis=0)) / 2
-    distance = float(jnp.linalg.norm(scene.eye - centre))
+    # Exact diffuse parts, so that the glossy part alone is in error.
+    anchors = make_anchors(scene.baked, diffuse=scene.baked)
+    center = (jnp.max(scene.baked.positions, axis=0) + jnp.min(scene.baked.positions, axis=0)) / 2
+    distance = float(jnp.linalg.norm(scene.eye - center))
     exponent = float(scene.material.exponent)
     atlas = make_tile_atlas(scene.baked, distance=distance, views=views, exponent=exponent)
     degree = round(0.7 * scene.row.degree)
 
-    def by(method: str, baked: Any = scene.baked, **options: Any) -> Shade:
+    def by(method: adaptive.AbstractMethod, baked: Any = scene.baked) -> Shade:
         def shade(frame: Scene, _: AdaptiveResult | None) -> AdaptiveResult:
-            seen = frame.light, baked, frame.eye, frame.material
-            return adaptive.shade(*seen, method=method, **options)
+            return adaptive.shade(frame.light, baked, frame.eye, frame.material, method)
 
         return shade
 
-    def remembering(method: str, baked: Any = scene.baked) -> Shade:
+    def remembering(method: adaptive.Levels | adaptive.TwoStage, baked: Any = scene.baked) -> Shade:
+        method = dataclasses.replace(method, hysteresis=hysteresis)
+
         def shade(frame: Scene, previous: AdaptiveResult | None) -> AdaptiveResult:
             seen = frame.light, baked, frame.eye, frame.material
-            options = {**thresholds, "previous": previous, "leave": leave}
-            return adaptive.shade(*seen, method=method, **options)
+            return adaptive.shade(*seen, dataclasses.replace(method, previous=previous))
 
         return shade
 
-    first = atlas.nearest(scene.baked, scene.eye)
+    first = atlas.nearest(scene.baked, scene.eye, diffuse=scene.baked)
 
     def tiles(frame: Scene, _: AdaptiveResult | None) -> AdaptiveResult:
-        made = atlas.nearest(frame.baked, frame.eye)
-        return adaptive.shade_tiles(frame.light, frame.baked, frame.eye, frame.material, made)
+        made = atlas.nearest(frame.baked, frame.eye, diffuse=frame.baked)
+        return made(frame.light, frame.eye, frame.material)
 
     def truncated(frame: Scene, _: AdaptiveResult | None) -> AdaptiveResult:
         light = frame.light[:, : harmonics.num_coefficients(degree)]
         color = transfer.shade_glossy(light, frame.baked, frame.eye, frame.material)
         return AdaptiveResult(color, {}, jnp.ones((), color.dtype))
 
-    yield Method("levels", by("levels", **thresholds))
-    yield Method("levels, hysteresis", remembering("levels"))
-    yield Method("two_stage", by("two_stage", staged, **thresholds))
-    yield Method("two_stage, hysteresis", remembering("two_stage", staged))
-    yield Method("probes", by("probes", probes=probes))
+    levels = adaptive.Levels(**thresholds)
+    two_stage = adaptive.TwoStage(threshold=thresholds["threshold"])
+    yield Method("levels", by(levels))
+    yield Method("levels, hysteresis", remembering(levels))
+    yield Method("two_stage", by(two_stage, staged))
+    yield Method("two_stage, hysteresis", remembering(two_stage, staged))
+    yield Method("probes", by(adaptive.Anchors(anchors)))
     yield Method("tiles", tiles)
-    yield Method("tiles, kept", by("tiles", tiles=first))
+    yield Method("tiles, kept", by(adaptive.Tiles(first)))
     yield Method(f"everyone at degree {degree}", truncated)
 
 
@@ -105,7 +108,7 @@ def play(method: Method, scenes: list[Scene], full: list[Array]) -> list[Frame]:
     previous = method.shade(scenes[0], None)  # fills a memory
     for scene, reference in zip(scenes, full, strict=True):
         previous = method.shade(scene, previous)
-        frames.append(Frame(previous.color, reference, previous.reached.get("specular")))
+        frames.append(Frame(previous.color, reference, previous.shown_degree.get("specular")))
     return frames
 
 

@@ -109,7 +109,7 @@ def _scene(config: Table1, context: Context, scene: Scene) -> Iterator[dict[str,
     about["psnr_eight_bits"] = scene.quality(rounded, reference).object
     lighter = times["full"] - times[DIFFUSE] + times[EIGHT_BITS]
     if "masks" in adaptive:
-        kept = first["masks"].kept
+        kept = first["masks"].active_fraction
         about |= {
             f"filtered_{kind}": 1 - float(np.asarray(kept[kind])[-1])
             for kind in ("diffuse", "specular")
@@ -119,7 +119,11 @@ def _scene(config: Table1, context: Context, scene: Scene) -> Iterator[dict[str,
     truncated = {name: quality[name] for name in lower}
     for method in adaptive:
         spent = times[method]
-        line = where | {"method": method, "fps": 1 / spent, "spent": float(first[method].spent)}
+        line = where | {
+            "method": method,
+            "fps": 1 / spent,
+            "spent": float(first[method].relative_cost),
+        }
         line |= {key: times[name] / spent for name, key in GAIN.items()}
         line["gain_eight_bits"] = lighter / spent
         line |= quality[method].named() | rival(spent, times, truncated)

@@ -24,7 +24,7 @@ Variant = Literal["outside at the base", "4 rings", "refined", "smoothed", "refi
 _EVERYONE = 1 << 20  # rings: more than there are
 _PLAIN = "as it is"
 _VARIANTS: dict[Variant, dict[str, Any]] = {
-    "outside at the base": {"outside": "base"},
+    "outside at the base": {"fallback": "base"},
     "4 rings": {"rings": 4},
     "refined": {"rings": _EVERYONE},
     "smoothed": {"smoothing": True},
@@ -81,8 +81,8 @@ def _rows(config: Threshold, context: Context, scene: Scene) -> Iterator[dict[st
                     "method": method,
                     "variant": variant,
                     "threshold": limit,
-                    "kept": float(np.ravel(np.asarray(result.kept["specular"]))[-1]),
-                    "spent": float(result.spent),
+                    "kept": float(np.ravel(np.asarray(result.active_fraction["specular"]))[-1]),
+                    "spent": float(result.relative_cost),
                     "gain": times["full"] / spent,
                     "gain_product": times["product form"] / spent,
                     "gain_einsum": times["einsum"] / spent,

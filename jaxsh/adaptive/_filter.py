@@ -1,4 +1,4 @@
-"""Multi-level filtering (Lee & Kim 2014, §4 and appendix), whichever way its products are made."""
+"""Multi-level filtering (Lee & Kim 2014, §4 and appendix), and the products that it adds up."""
 
 import functools
 import math
@@ -8,34 +8,31 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from .._core.linalg import tall_product
-from ..harmonics import degree_of, num_coefficients, product_matrix
+from .._core.linalg import PRECISION, tall_product
+from .._core.xla import on_mesh
+from ..harmonics import convolve, degree_of, evaluate, num_coefficients, phong, product_matrix
 from ..transfer import Material, Transfer
 from ..transfer._glossy_kernels import reflected
-from ._compact import compacted, everywhere
-from ._costs import product_cost
-from ._products import base_product, increment, lobe_kernel
-from ._refine import grow, smooth
-from ._result import AdaptiveResult
-from ._roi import Region, decide, seen_as_changed
+from ._regions import Region, compacted, decide, everywhere, grow, seen_as_changed, smooth
+from ._result import AdaptiveResult, product_cost
 
 
 class Filter(eqx.Module):
-    """What decides, checked and in the transfer's dtype."""
+    """Holds what decides, checked and in the transfer's dtype."""
 
     thresholds: dict[str, Float[Array, ""]]
     exposure: Float[Array, ""]
-    leave: Float[Array, ""]
+    hysteresis: Float[Array, ""]
     base: int = eqx.field(static=True)
     rings: int = eqx.field(static=True)
     smoothing: bool = eqx.field(static=True)
-    outside: str = eqx.field(static=True)
+    fallback: str = eqx.field(static=True)
     distant: bool = eqx.field(static=True)
     normalized: bool = eqx.field(static=True)
 
 
 class Products(eqx.Module):
-    """What the levels of a frame are made of."""
+    """Holds the factors of a frame's levels."""
 
     light: Float[Array, "3 k"]
     matrix: Float[Array, "3 k k"]
@@ -43,22 +40,26 @@ class Products(eqx.Module):
     kernel: Float[Array, "v k"]
 
     def diffuse(self, start: int, end: int) -> Float[Array, "3 v"]:
-        """Σ_i L_i O_i over harmonics `start` to `end`, of all vertices: algorithm 2."""
+        """Sum L_i O_i over harmonics `start` to `end`, of all vertices: algorithm 2."""
         return tall_product(self.transfer[:, start:end], self.light[:, start:end]).T
 
-    def base(self, degree: int, rows: Int[Array, " n"]) -> Float[Array, "3 n"]:
+    def base(self, degree: int, rows: Int[Array, " n"] | None) -> Float[Array, "3 n"]:
+        """Multiply light, transfer and lobe up to a degree."""
         count = num_coefficients(degree)
         kernel, transfer = (_take(one, rows, count) for one in (self.kernel, self.transfer))
         return base_product(self.matrix, kernel, transfer, count)
 
-    def change(self, start: int, end: int, rows: Int[Array, " n"]) -> Float[Array, "3 n"]:
-        """From degree `start` to degree `end`."""
+    def change(self, start: int, end: int, rows: Int[Array, " n"] | None) -> Float[Array, "3 n"]:
+        """Add the products from degree `start` to degree `end`."""
         old, new = num_coefficients(start), num_coefficients(end)
         kernel, transfer = (_take(one, rows, new) for one in (self.kernel, self.transfer))
         return increment(self.matrix, kernel, transfer, old, new)
 
 
-def _take(table: Float[Array, "v k"], rows: Int[Array, " n"], count: int) -> Float[Array, "few n"]:
+def _take(table, rows, count: int) -> Float[Array, "few n"]:
+    """Takes the first coefficients of some vertices, or with None of all."""
+    if rows is None:
+        return table[:, :count].T
     return table.at[rows, :count].get(mode="promise_in_bounds").T
 
 
@@ -67,10 +68,12 @@ def _products(light, transfer: Transfer, eye, exponent, options: Filter) -> Prod
     axis = reflected(eye, transfer.positions, transfer.normals, options.distant)
 
     def kernel(rows):
+        if rows is None:
+            return lobe_kernel(axis, exponent, degree, options.normalized)
         own = exponent[rows] if exponent.ndim else exponent
         return lobe_kernel(axis[:, rows], own, degree, options.normalized)
 
-    kernels = everywhere(kernel, len(transfer.positions)).T
+    kernels = everywhere(kernel, transfer.num_points, whole=on_mesh(axis)).T
     return Products(light, product_matrix(light), transfer.coefficients, kernels)
 
 
@@ -84,20 +87,21 @@ def filtered(
     previous: dict[str, Array] | None,
     compact: bool,
 ) -> AdaptiveResult:
-    """Algorithm 1 for the diffuse and the specular part, refined and smoothed."""
+    """Runs algorithm 1 for the diffuse and the specular part, refined and smoothed."""
     products = _products(light, transfer, eye, material.exponent, options)
-    color, spent = jnp.zeros((3, len(transfer.positions)), light.dtype), 0.0
-    kept, reached = {}, {}
-    for kind, albedo in albedos(material, len(transfer.positions)).items():
+    color, cost = 0.0, 0.0
+    fractions, degrees = {}, {}
+    for kind, albedo in albedos(material, transfer.num_points).items():
         shown, region, work = _one(kind, albedo, products, transfer, options, previous, compact)
         color = color + albedo * shown
-        kept[kind], reached[kind] = region.kept, region.reached
-        spent = spent + work
-    return AdaptiveResult(color.T, kept, jnp.asarray(spent, color.dtype), reached)
+        fractions[kind], degrees[kind] = region.fractions, region.degree
+        cost = cost + work
+    return AdaptiveResult(color.T, fractions, jnp.asarray(cost, color.dtype), degrees)
 
 
 def _one(kind, albedo, products, transfer, options, previous, compact):
-    count, target = len(transfer.positions), degree_of(products.light.shape[-1])
+    count, target = transfer.num_points, degree_of(products.light.shape[-1])
+    whole = on_mesh(products.transfer)
     seen = jax.lax.stop_gradient(options.exposure * albedo)
 
     # The diffuse part costs less than it does to pick those that need it.
@@ -107,17 +111,17 @@ def _one(kind, albedo, products, transfer, options, previous, compact):
         if kind == "diffuse":
             return products.diffuse(num_coefficients(start), num_coefficients(end))
         work = functools.partial(products.change, start, end)
-        return compacted(work, active) if compact else everywhere(work, count)
+        return compacted(work, active) if compact else everywhere(work, count, whole=whole)
 
     if kind == "diffuse":
         base = products.diffuse(0, num_coefficients(options.base))
     else:
-        base = everywhere(functools.partial(products.base, options.base), count)
+        base = everywhere(functools.partial(products.base, options.base), count, whole=whole)
     region = Region.start(options.base, count, base.dtype)
     cost = functools.partial(product_cost, kind, target=target)
-    spent = cost(0, options.base)
+    total_cost = cost(0, options.base)
     for level in range(options.base + 1, target + 1):
-        spent += cost(level - 1, level) * jnp.mean(region.active, dtype=base.dtype)
+        total_cost += cost(level - 1, level) * jnp.mean(region.active, dtype=base.dtype)
         change = changes(level - 1, level, region.active)
         region = decide(
             region,
@@ -125,35 +129,35 @@ def _one(kind, albedo, products, transfer, options, previous, compact):
             change,
             threshold(kind, level, options, previous, count),
             seen,
-            options.outside,
+            options.fallback,
         )
     if options.rings:
         limit = threshold(kind, target, options, None, count)
-        whole = functools.partial(changes, options.base, target)
+        every_level = functools.partial(changes, options.base, target)
 
         def joins(fringe):
-            return seen_as_changed(jax.lax.stop_gradient(whole(fringe)), limit, seen)
+            return seen_as_changed(jax.lax.stop_gradient(every_level(fringe)), limit, seen)
 
         grown = grow(region.active, transfer.neighbors, joins, options.rings)
         joined = grown & ~region.active
         region = region._replace(
-            added=jnp.where(joined[None], whole(joined), region.added),
-            reached=jnp.where(joined, jnp.asarray(target, jnp.int32), region.reached),
+            added=jnp.where(joined[None], every_level(joined), region.added),
+            degree=jnp.where(joined, jnp.asarray(target, jnp.int32), region.degree),
             active=grown,
         )
-        spent += cost(options.base, target) * jnp.mean(joined, dtype=base.dtype)
+        total_cost += cost(options.base, target) * jnp.mean(joined, dtype=base.dtype)
     if options.smoothing:
         added = smooth(region.added, region.active, transfer.neighbors)
         region = region._replace(added=added)
-    return base + region.added, region, spent if compact else cost(0, target)
+    return base + region.added, region, total_cost if compact else cost(0, target)
 
 
 def threshold(kind, level, options: Filter, previous, count) -> Float[Array, " v"]:
-    """Lower for those that the previous frame held at this level."""
+    """Lowers the threshold for those that the previous frame held at this level."""
     limit = jnp.full(count, 1.0, options.exposure.dtype) * options.thresholds[kind]
     if previous is None:
         return limit
-    return jnp.where(previous[kind] >= level, options.leave * limit, limit)
+    return jnp.where(previous[kind] >= level, options.hysteresis * limit, limit)
 
 
 def albedos(material: Material, count: int) -> dict[str, Float[Array, "3 v"]]:
@@ -165,3 +169,46 @@ def albedos(material: Material, count: int) -> dict[str, Float[Array, "3 v"]]:
         "diffuse": columns(material.diffuse) / math.pi,
         "specular": columns(material.specular),
     }
+
+
+def lobe_kernel(
+    axis: Float[Array, "3 n"], exponent: Float[Array, "..."], degree: int, normalized: bool
+) -> Float[Array, "k n"]:
+    """Computes α_i y_i(B)."""
+    ones = jnp.ones(num_coefficients(degree), axis.dtype)
+    alpha = convolve(ones, phong(exponent, degree, normalized=normalized))
+    basis = evaluate(axis.T, degree, axis=0)
+    return basis * (alpha[:, None] if alpha.ndim == 1 else alpha.T)
+
+
+def base_product(
+    matrix: Float[Array, "3 k k"],
+    kernel: Float[Array, "kernel n"],
+    transfer: Float[Array, "transfer n"],
+    count: int,
+) -> Float[Array, "3 n"]:
+    """Computes S = Σ_ij α_i y_i(B) L̂_ij O_j over the first `count` harmonics."""
+    rows = _rows(matrix[:, :count, :count], transfer[:count])
+    return jnp.sum(rows * kernel[None, :count], axis=1)
+
+
+def increment(
+    matrix: Float[Array, "3 k k"],
+    kernel: Float[Array, "kernel n"],
+    transfer: Float[Array, "transfer n"],
+    old: int,
+    new: int,
+) -> Float[Array, "3 n"]:
+    """Computes what harmonics `old` to `new` add to S: algorithm 3, which repeats no product.
+
+    Its first loop is over new rows i and all columns. Its second, over old rows and new columns,
+    uses that L̂ is symmetric. The paper's adds R_i whole once more there; only the new columns'
+    part is to be added.
+    """
+    block = matrix[:, old:new]
+    by_row = _rows(block[..., :new], transfer[:new]) * kernel[None, old:new]
+    by_column = _rows(block[..., :old], kernel[:old]) * transfer[None, old:new]
+    return jnp.sum(by_row + by_column, axis=1)
+
+
+_rows = functools.partial(jnp.tensordot, axes=1, precision=PRECISION)

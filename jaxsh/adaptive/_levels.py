@@ -1,30 +1,195 @@
-"""The paper's filter, compacted: a dropped vertex costs nothing."""
+"""Lee and Kim's filter: with every vertex under a mask, and compacted."""
 
-from typing import Unpack
+import dataclasses
+import operator
+from typing import Literal
 
+import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
-from ..transfer import Material, Transfer
-from ._filter import filtered
-from ._options import FilterOptions, checked
+from ..harmonics import degree_of
+from ..transfer import AbstractTransfer, Material
+from ._filter import Filter, filtered
+from ._method import (
+    AbstractMethod,
+    check_one_device,
+    checked_frame,
+    checked_scalar,
+    plain_transfer,
+    scalars,
+    suggestion,
+)
 from ._result import AdaptiveResult
 
+FALLBACKS = ("level", "base")
 
-def shade_levels(
-    light: Float[ArrayLike, "3 k"],
-    transfer: Transfer,
-    eye: Float[ArrayLike, " 3"],
-    material: Material,
-    **options: Unpack[FilterOptions],
-) -> AdaptiveResult:
-    """`shade_masks`, with the same arguments and result, at the cost of the vertices inside alone.
+
+class AbstractFilter(AbstractMethod):
+    """Holds the options that the filtering methods share; `Masks` says what they mean."""
+
+    threshold: Float[ArrayLike, ""] = 0.02
+    exposure: Float[ArrayLike, ""] = 1.0
+    base: int = eqx.field(static=True, default=2)
+    fallback: Literal["level", "base"] = eqx.field(static=True, default="level")
+    rings: int = eqx.field(static=True, default=0)
+    smoothing: bool = eqx.field(static=True, default=False)
+    previous: AdaptiveResult | None = None
+    hysteresis: Float[ArrayLike, ""] = 1.0
+    distant: bool = eqx.field(static=True, default=False)
+    normalized: bool = eqx.field(static=True, default=True)
+
+    def __check_init__(self):
+        if operator.index(self.base) < 0:
+            raise ValueError(f"expected base >= 0, got {self.base}")
+        if operator.index(self.rings) < 0:
+            raise ValueError(f"expected rings >= 0, got {self.rings}")
+        if self.fallback not in FALLBACKS:
+            raise ValueError(
+                f"expected fallback to be one of {FALLBACKS}, got {self.fallback!r}; "
+                f"{suggestion(self.fallback, FALLBACKS)}"
+            )
+        for name in ("threshold", "exposure", "hysteresis"):
+            checked_scalar(name, getattr(self, name))
+
+    def settings(self, light, diffuse_threshold) -> Filter:
+        """Cast to the light's dtype; raises `ValueError` for a base above the light's degree."""
+        target = degree_of(light.shape[-1])
+        if self.base > target:
+            raise ValueError(
+                f"expected base from 0 to the light's degree, {target}, got {self.base}"
+            )
+        cast = scalars(
+            light.dtype,
+            threshold=self.threshold,
+            diffuse_threshold=diffuse_threshold,
+            exposure=self.exposure,
+            hysteresis=self.hysteresis,
+        )
+        return Filter(
+            {"specular": cast["threshold"], "diffuse": cast["diffuse_threshold"]},
+            cast["exposure"],
+            cast["hysteresis"],
+            self.base,
+            self.rings,
+            self.smoothing,
+            self.fallback,
+            self.distant,
+            self.normalized,
+        )
+
+    def remembered(self, count: int):
+        """Return the degrees that the previous frame showed, or None."""
+        if self.previous is None:
+            return None
+        shown = self.previous.shown_degree
+        if {"diffuse", "specular"} - set(shown) or any(len(one) != count for one in shown.values()):
+            raise ValueError(f"expected previous as a result of this method for {count} vertices")
+        return {name: jnp.asarray(one) for name, one in shown.items()}
+
+    def follow(self, previous: AdaptiveResult) -> "AbstractFilter":
+        """Return the method with the frame before, for `hysteresis`."""
+        return dataclasses.replace(self, previous=previous)
+
+
+class Masks(AbstractFilter):
+    """Filters level by level, everyone under a mask: Lee & Kim 2014, algorithms 1 to 3.
+
+    Diffuse and specular light are accumulated from degree `base` to the light's, each with a
+    region of interest of its own, which all vertices are in at first. A vertex leaves where the
+    change since the base falls below a threshold, and comes back only by refinement. Everything
+    is computed for everyone, so this is the reference and never pays: see `Levels`.
+
+    **Options**
+
+    - `threshold`, `diffuse_threshold`: of the largest change over red, green and blue, after the
+      albedo and times `exposure`. At 0 everyone stays.
+    - `base`: degree that everyone is computed at.
+    - `fallback`: what a vertex shows that left. "level": all it was computed to, the level at
+      which it left included, as in algorithm 1, where the change is added before the test. "base":
+      up to the last level at which it stayed, so that only those inside differ from the base, as
+      in the text. The paper does not say which.
+    - `rings`: of breadth-first refinement (§4.4) around the region. Neighbors are computed in
+      full and join where their change reaches the threshold. The number of vertices means to
+      convergence.
+    - `smoothing`: the paper's, of two rings around the region.
+    - `previous`, `hysteresis`: a memory, not in the paper. For a vertex that the previous result
+      showed at a level, that level's threshold is `hysteresis` times as high.
+    - `distant`, `normalized`: as for `transfer.shade_glossy`.
+
+    Called with a frame as `shade` is, it **returns** an `AdaptiveResult`. `active_fraction` counts
+    who stays after each level, before refinement; the paper's filtering ratio is one less it.
+    Differentiable in light, material and transfer, forward and reverse, where nobody enters or
+    leaves; thresholds and exposure have no gradient. Without rings and smoothing it keeps a
+    sharding over vertices.
+
+    Deviations: |change|, the largest over the channels, where the paper writes change; the second
+    loop of algorithm 3 adds the increment alone. Raises `ValueError` for shapes and options that
+    do not fit.
+
+    **Example**
+
+    >>> from jaxsh import adaptive
+    >>> adaptive.Masks(threshold=0.05).base
+    2
+    """
+
+    diffuse_threshold: Float[ArrayLike, ""] = 0.01
+
+    def __check_init__(self):
+        checked_scalar("diffuse_threshold", self.diffuse_threshold)
+
+    def __call__(
+        self,
+        light: Float[ArrayLike, "3 k"],
+        transfer: AbstractTransfer,
+        eye: Float[ArrayLike, " 3"],
+        material: Material,
+    ) -> AdaptiveResult:
+        if self.rings or self.smoothing:
+            check_one_device("Masks with rings or smoothing", transfer)
+        return _filtered(self, "masks", light, transfer, eye, material, compact=False)
+
+
+class Levels(AbstractFilter):
+    """Filters as `Masks` does, at the cost of the vertices inside alone.
 
     Each level gathers the vertices that are left into blocks. Their number may change from frame
     to frame without another compilation. The diffuse part is decided on, but computed for all,
-    which costs less than to gather. Agrees with `shade_masks` to rounding.
+    which costs less than to gather. Options, result and errors are those of `Masks`, with which it
+    agrees to rounding; it refuses arrays on several devices, since it gathers.
 
     It pays against an einsum of light product, transfer and lobe; not against the same product in
     tiles of vertices, nor against `transfer.shade_glossy` of a sampled transfer. Experiment
     `leekim2014.table1` prints all three.
+
+    **Example**
+
+    >>> from jaxsh import adaptive
+    >>> adaptive.Levels(treshold=0.05)
+    Traceback (most recent call last):
+    TypeError: Levels has no option 'treshold'; did you mean 'threshold'?
     """
-    return filtered(*checked(light, transfer, eye, material, **options), compact=True)
+
+    diffuse_threshold: Float[ArrayLike, ""] = 0.01
+
+    def __check_init__(self):
+        checked_scalar("diffuse_threshold", self.diffuse_threshold)
+
+    def __call__(
+        self,
+        light: Float[ArrayLike, "3 k"],
+        transfer: AbstractTransfer,
+        eye: Float[ArrayLike, " 3"],
+        material: Material,
+    ) -> AdaptiveResult:
+        check_one_device("Levels", transfer)
+        return _filtered(self, "levels", light, transfer, eye, material, compact=True)
+
+
+def _filtered(method, name, light, transfer, eye, material, compact):
+    plain = plain_transfer(name, transfer)
+    light, eye, material = checked_frame(light, plain, eye, material)
+    settings = method.settings(light, method.diffuse_threshold)
+    previous = method.remembered(plain.num_points)
+    return filtered(light, plain, eye, material, settings, previous, compact=compact)

@@ -1,77 +1,78 @@
-"""All methods by name."""
-
-from typing import Any
+"""The one door: a frame, and the method to shade it by."""
 
 from jaxtyping import ArrayLike, Float
 
-from ..transfer import Material, QuantizedTransfer, Transfer
-from ._levels import shade_levels
-from ._masks import shade_masks
-from ._probe_sets import ProbeSet
-from ._probes import shade_probes
+from ..transfer import AbstractTransfer, Material
+from ._anchors import Anchors
+from ._levels import Levels, Masks
+from ._method import AbstractMethod, suggestion
 from ._result import AdaptiveResult
-from ._staged import StagedTransfer
-from ._tile_sets import TileSet
-from ._tiles import shade_tiles
-from ._two_stage import shade_two_stage
+from ._tiles import Tiles
+from ._two_stage import TwoStage
 
-METHODS = {
-    "masks": shade_masks,
-    "levels": shade_levels,
-    "two_stage": shade_two_stage,
-    "probes": shade_probes,
-    "tiles": shade_tiles,
+METHODS: dict[str, type[AbstractMethod]] = {
+    "masks": Masks,
+    "levels": Levels,
+    "two_stage": TwoStage,
+    "anchors": Anchors,
+    "tiles": Tiles,
 }
-# What a method cannot do without, as the option of its own name.
-SETS = {"probes": ProbeSet, "tiles": TileSet}
 
 
 def shade(
     light: Float[ArrayLike, "3 k"],
-    transfer: Transfer | QuantizedTransfer | StagedTransfer,
+    transfer: AbstractTransfer,
     eye: Float[ArrayLike, " 3"],
     material: Material,
-    *,
-    method: str,
-    **options: Any,
+    method: AbstractMethod | str,
 ) -> AdaptiveResult:
-    """Diffuse and glossy radiance of V vertices, with less work than `transfer.shade_glossy`.
+    """Compute the diffuse and glossy radiance of V vertices with less work than `shade_glossy`.
 
-    - "masks": Lee & Kim 2014 as printed, everyone through every level under a mask. The
+    - `Masks()`, "masks": Lee & Kim 2014 as printed, everyone through every level under a mask. The
       reference; never pays.
-    - "levels": the same, at the cost of those alone that are left. Pays against an einsum of
-      three operands, and no more.
-    - "two_stage": one decision at a middle degree, then all or nothing. Of what `stage` makes.
-      Pays against products with the light's matrix, not against `shade_glossy`.
-    - "probes": glossy light at `probes`, a `ProbeSet`, interpolated where it is smooth. Somewhat
-      faster than `shade_glossy`.
-    - "tiles": sums over few directions about the reflected one, those of `tiles`, a `TileSet`.
-      Pays against all of them.
+    - `Levels()`, "levels": the same, at the cost of those alone that are left. Pays against an
+      einsum of three operands, and no more.
+    - `TwoStage()`, "two_stage": one decision at a middle degree, then all or nothing. Pays against
+      products with the light's matrix, not against `transfer.shade_glossy`.
+    - `Anchors()`, "anchors": glossy light at anchor vertices, interpolated where it is smooth.
+      Somewhat faster than `transfer.shade_glossy`.
+    - `Tiles()`, "tiles": sums over few directions about the reflected one. Pays against all of
+      them.
 
-    The last two need of `transfer` the diffuse part alone, and are faster where it is what
-    `transfer.quantize` makes.
+    **Arguments**
 
-    `shade_glossy` is that of a sampled transfer, on the CPU. Where only the light turns, none of
-    these is as fast as `transfer.fixed_view`, which is exact; where only the eye moves, a
-    `transfer.fixed_light` is at hand.
-    `options` are those of the function `shade_<method>`, which says what it takes and returns.
-    Experiment `leekim2014.table1` prints what each method gains, and what it costs in quality.
+    - `light`, `eye`, `material`: as for `transfer.shade_glossy`; one light (3, K) for all vertices.
+    - `transfer`: the last three prepare it. Do that once for many frames: give `TwoStage` the
+      result of `stage` as the transfer, `Anchors(make_anchors(...))`, `Tiles(make_tiles(...))`;
+      what is not given is made anew in each call. An anchor or tile set shades by itself, too:
+      `tiles(light, eye, material)`.
+    - `method`: one of these objects, whose fields are the options, or its name for the defaults.
 
-    Raises `ValueError` for an unknown method or a missing set, `TypeError` for an option that the
-    method does not have.
+    **Returns** an `AdaptiveResult`. The class of the method says what is differentiable.
+
+    `shade_glossy` in these comparisons is that of a sampled transfer, on the CPU. Where only the
+    light turns, none of these is as fast as `transfer.fixed_view`, which is exact; where only the
+    eye moves, a `transfer.fixed_light` is at hand. Experiment `leekim2014.table1` prints what each
+    method gains, and what it costs in quality.
+
+    Raises `ValueError` for an unknown method and for shapes that do not fit; the constructors of
+    the methods raise `TypeError` for an option that they do not have. Both name the nearest one.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points, eye = sphere.fibonacci(50).directions, jnp.asarray([0.0, -3.0, 0.0])
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> frame = jnp.ones((3, 9)), made, eye, transfer.Material(0.5, 0.5, 8.0)
+    >>> adaptive.shade(*frame, adaptive.Tiles(num_tiles=3, block=16)).color.shape
+    (50, 3)
+    >>> adaptive.shade(*frame, "tile")
+    Traceback (most recent call last):
+    ValueError: there is no method 'tile'; did you mean 'tiles'?
     """
-    if method not in METHODS:
-        raise ValueError(f"expected method to be one of {', '.join(METHODS)}, got {method!r}")
-    if method in SETS and not isinstance(options.get(method), SETS[method]):
-        kind = SETS[method].__name__
-        raise ValueError(
-            f"method {method!r} needs {method}=, a {kind} made by make_{method}, got "
-            f"{type(options.get(method)).__name__}"
-        )
-    if isinstance(transfer, StagedTransfer) and method != "two_stage":
-        transfer = transfer.transfer
-    if isinstance(transfer, QuantizedTransfer) and method not in SETS:
-        raise ValueError(
-            f"method {method!r} needs the transfer's coefficients, got what quantize made of them"
-        )
-    return METHODS[method](light, transfer, eye, material, **options)
+    if isinstance(method, str):
+        if method not in METHODS:
+            raise ValueError(f"there is no method {method!r}; {suggestion(method, METHODS)}")
+        method = METHODS[method]()
+    return method(light, transfer, eye, material)

@@ -1,4 +1,4 @@
-"""A transfer at several degrees, each as values in directions, for methods that recompute."""
+"""Transfer at several degrees, each as values in directions, for methods that recompute."""
 
 import functools
 
@@ -11,35 +11,63 @@ from .._core.checks import check_degree
 from .._core.linalg import matmul, tall_product
 from .._core.xla import materialize
 from ..harmonics import degree_of
-from ..transfer import QuantizedTransfer, SampledTransfer, Transfer, quantize, sample
+from ..transfer import (
+    AbstractTransfer,
+    SampledTransfer,
+    Transfer,
+    quantize,
+    sample,
+)
 from ..transfer._glossy_kernels import in_steps, lobe, product_nodes
+from ._method import check_one_device
 
 
 class SampledRows(eqx.Module):
-    """A transfer in the directions of `product_nodes`, vertex by vertex. Made by `sample_rows`."""
+    """Holds a transfer in the directions of `product_nodes`, vertex by vertex."""
 
     samples: Int8[Array, "v n"] | Float[Array, "v n"]
-    steps: Float[Array, " n"]  # what samples count
+    scales: Float[Array, " n"]  # a value is its sample times its scale
 
 
-class StagedTransfer(eqx.Module):
-    """A transfer ready for `shade_two_stage`, made once by `stage`.
+class StagedTransfer(AbstractTransfer):
+    """Holds a transfer ready for `TwoStage`, made once by `stage`.
 
     All vertices at two low degrees, and vertex by vertex the values of the whole transfer at
     nodes: the form in which any vertices, wherever they are, are recomputed in full fast.
     """
 
     transfer: Transfer
-    diffuse: Transfer | QuantizedTransfer
+    diffuse: AbstractTransfer
     base: SampledTransfer
     middle: SampledTransfer
     rows: SampledRows
-    degree: int = eqx.field(static=True)
+    target: int = eqx.field(static=True)  # degree of the lights to come
+
+    @property
+    def num_points(self) -> int:
+        return self.transfer.num_points
+
+    @property
+    def degree(self) -> int:
+        return self.transfer.degree
+
+    @property
+    def dtype(self) -> jnp.dtype:
+        return self.transfer.dtype
 
     @property
     def degrees(self) -> tuple[int, int, int]:
-        """Of base, middle and light."""
-        return self.base.degree, self.middle.degree, self.degree
+        """The degrees of base, middle and light."""
+        return self.base.degree, self.middle.degree, self.target
+
+    def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
+        return self.diffuse.irradiances(lights)
+
+    def vectors(self, width: int) -> Float[Array, "v k"]:
+        return self.transfer.vectors(width)
+
+    def glossy_form(self, degree: int) -> Transfer:
+        return self.transfer
 
 
 def stage(
@@ -50,11 +78,24 @@ def stage(
     base: int = 2,
     quantized: bool = True,
 ) -> StagedTransfer:
-    """The transfer, ready for `shade_two_stage` with lights of `degree` (default: its own).
+    """Prepare the transfer for `TwoStage` with lights of `degree` (default: its own).
 
-    `middle` is the degree of the first stage (default: three fifths of `degree`, but above `base`,
-    or there is no change to see), and `base` the one below which nobody falls. Raises `ValueError`
-    unless base <= middle <= degree <= the transfer's.
+    **Arguments**
+
+    - `middle`: degree of the first stage (default: three fifths of `degree`, but above `base`, or
+      there is no change to see).
+    - `base`: degree below which nobody falls.
+    - `quantized`: whether the samples and the diffuse part are rounded to eight bits.
+
+    Raises `ValueError` unless base <= middle <= degree <= the transfer's.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import adaptive, transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> adaptive.stage(transfer.unshadowed(up, up, degree=4), base=1).degrees
+    (1, 2, 4)
     """
     degree = transfer.degree if degree is None else check_degree(degree)
     base = check_degree(base)
@@ -65,9 +106,10 @@ def stage(
             f"expected base <= middle <= degree <= the transfer's, {transfer.degree}, got {base}, "
             f"{middle} and {degree}"
         )
+    check_one_device("stage", transfer)
     return StagedTransfer(
         transfer,
-        quantize(transfer) if quantized else transfer,
+        diffuse_part(transfer, None, quantized),
         sample(transfer, base),
         sample(transfer, middle),
         sample_rows(transfer.coefficients, degree, quantized),
@@ -75,10 +117,25 @@ def stage(
     )
 
 
+def diffuse_part(
+    transfer: Transfer, given: AbstractTransfer | None, quantized: bool
+) -> AbstractTransfer:
+    """Returns the diffuse part of a prepared set: the given one, eight bits, or the transfer."""
+    if given is None:
+        return quantize(transfer) if quantized else transfer
+    if given.num_points != transfer.num_points or given.degree != transfer.degree:
+        raise ValueError(
+            f"expected a diffuse part of {transfer.num_points} vertices and degree "
+            f"{transfer.degree}, got {given.num_points} and {given.degree}"
+        )
+    return given
+
+
 @functools.partial(jax.jit, static_argnums=(1, 2))
 def sample_rows(
     coefficients: Float[Array, "v k"], degree: int, quantized: bool = True
 ) -> SampledRows:
+    """Evaluates coefficients, cut to a degree, at the nodes of `product_nodes`."""
     basis = jnp.asarray(product_nodes(degree).basis, coefficients.dtype)
     samples = matmul(coefficients[:, : basis.shape[1]], basis.T)
     if quantized:
@@ -93,10 +150,10 @@ def row_products(
     lobes: Float[Array, "bands ..."],
     rows: Int[Array, " b"],
 ) -> Float[Array, "3 b"]:
-    """∫ L O lobe(B·ω) dω of some vertices: what `shade_glossy` does for all."""
+    """Integrates L O lobe(B·ω) for some vertices, as `shade_glossy` does for all."""
     nodes = product_nodes(degree_of(light.shape[-1]))
     directions, project = (jnp.asarray(a, light.dtype) for a in (nodes.directions, nodes.project))
-    weights = matmul(light, project) * transfer.steps[None]
+    weights = matmul(light, project) * transfer.scales[None]
     if lobes.ndim == 2:
         lobes = lobes.at[:, rows].get(mode="promise_in_bounds")
     lobes = lobes.reshape(len(lobes), -1, 1)

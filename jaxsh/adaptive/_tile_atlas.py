@@ -7,55 +7,64 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
 from ..sphere import fibonacci
-from ..transfer import Transfer
+from ..transfer import AbstractTransfer, Transfer, quantize
 from ..transfer._glossy_kernels import checked_eye
 from ._local_rule import check_rule
-from ._tile_sets import (
-    BLOCK,
-    COUNT,
-    DIRECTIONS,
-    EXPONENT,
-    TileSet,
-    Tiling,
-    arrange,
-    make_tiling,
-    vertex_areas,
-)
+from ._method import check_known
+from ._tiles import DIRECTIONS, EXPONENT, TileSet, arrange
+from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling, vertex_areas
 
 
 class TileAtlas(eqx.Module):
-    """Tilings of one mesh for eyes all around it. Made by `make_tile_atlas`.
+    """Holds tilings of one mesh for eyes all around it. Made by `make_tile_atlas`.
 
-    Indices and each tile's axis, 4 bytes a vertex and view; the transfer is put in a view's order,
-    and sampled, when needed.
+    It holds indices and each tile's axis, 4 bytes a vertex and view; the transfer is put in a
+    view's order, and sampled, when needed.
     """
 
-    order: Int[Array, "views blocks b"]
+    permutation: Int[Array, "views blocks b"]
     tile: Int[Array, "views blocks"]
     axes: Float[Array, "views tiles 3"]
-    eyes: Float[Array, "views 3"]  # directions from the centre to each eye
-    centre: Float[Array, " 3"]  # of the mesh's box; zero where the eyes are far away
+    eyes: Float[Array, "views 3"]  # directions from the center to each eye
+    center: Float[Array, " 3"]  # of the mesh's box; zero where the eyes are far away
     directions: int = eqx.field(static=True)
     exponent: float = eqx.field(static=True)
 
     def view(self, eye: Float[ArrayLike, " 3"]) -> int:
-        """The number of the view whose direction is nearest to that of `eye`."""
-        towards = np.asarray(checked_eye(eye, self.centre.dtype)) - np.asarray(self.centre)
+        """Return the number of the view whose direction is nearest to that of `eye`."""
+        towards = np.asarray(checked_eye(eye, self.center.dtype)) - np.asarray(self.center)
         return int(np.argmax(np.asarray(self.eyes) @ towards))
 
     def tiling(self, view: int) -> Tiling:
+        """Return the tiling of a view, by its number."""
         if not 0 <= view < len(self.eyes):
             raise ValueError(f"expected a view from 0 to {len(self.eyes) - 1}, got {view}")
-        return Tiling(self.order[view], self.tile[view], self.axes[view])
+        return Tiling(self.permutation[view], self.tile[view], self.axes[view])
 
-    def nearest(self, transfer: Transfer, eye: Float[ArrayLike, " 3"]) -> TileSet:
-        """The tile set of the nearest view. All sets of an atlas have the same shapes."""
-        return self.arranged(transfer, self.view(eye))
+    def nearest(
+        self,
+        transfer: Transfer,
+        eye: Float[ArrayLike, " 3"],
+        *,
+        diffuse: AbstractTransfer | None = None,
+    ) -> TileSet:
+        """Make the tile set of the nearest view. All sets of an atlas have the same shapes.
 
-    def arranged(self, transfer: Transfer, view: int) -> TileSet:
-        """The tile set of a view, by its number."""
-        tiling = self.tiling(view)
-        return arrange(transfer, tiling, directions=self.directions, exponent=self.exponent)
+        `diffuse` is the diffuse part, where it is there already (default: eight bits, made anew).
+        """
+        return self.arranged(transfer, self.view(eye), diffuse=diffuse)
+
+    def arranged(
+        self, transfer: Transfer, view: int, *, diffuse: AbstractTransfer | None = None
+    ) -> TileSet:
+        """Make the tile set of a view, by its number."""
+        return arrange(
+            transfer,
+            self.tiling(view),
+            directions=self.directions,
+            exponent=self.exponent,
+            diffuse=diffuse,
+        )
 
 
 def make_tile_atlas(
@@ -63,34 +72,45 @@ def make_tile_atlas(
     *,
     distance: float | None = None,
     views: int = 128,
-    count: int = COUNT,
+    num_tiles: int = NUM_TILES,
     block: int = BLOCK,
     directions: int = DIRECTIONS,
     exponent: float = EXPONENT,
 ) -> TileAtlas:
-    """Tilings for `views` directions, spread evenly over the sphere.
+    """Make tilings for `views` directions, spread evenly over the sphere.
 
-    The eyes stand at `distance` from the centre of the mesh's box, or far away (default). Other
+    The eyes stand at `distance` from the center of the mesh's box, or far away (default). Other
     arguments and errors as for `make_tiles`; raises `ValueError` for fewer than one view too.
+
+    **Example**
+
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> atlas = adaptive.make_tile_atlas(made, views=3, num_tiles=2, block=16)
+    >>> atlas.nearest(made, atlas.eyes[1]).samples.shape
+    (4, 26, 16)
     """
     check_rule(directions, exponent)
+    check_known("make_tile_atlas", transfer)
     if views < 1:
         raise ValueError(f"expected at least 1 view, got {views}")
     towards = fibonacci(views).directions.astype(transfer.positions.dtype)
-    distant, centre = distance is None, jnp.zeros((3,), transfer.positions.dtype)
+    distant, center = distance is None, jnp.zeros((3,), transfer.positions.dtype)
     eyes = towards
     if distance is not None:
-        centre = (transfer.positions.max(axis=0) + transfer.positions.min(axis=0)) / 2
-        eyes = centre[None] + distance * towards
+        center = (transfer.positions.max(axis=0) + transfer.positions.min(axis=0)) / 2
+        eyes = center[None] + distance * towards
     areas = vertex_areas(transfer)
     tilings = [
-        make_tiling(transfer, eye, distant=distant, count=count, block=block, areas=areas)
+        make_tiling(transfer, eye, distant=distant, num_tiles=num_tiles, block=block, areas=areas)
         for eye in eyes
     ]
-    order, tile, axes = (
-        jnp.stack([getattr(one, name) for one in tilings]) for name in ("order", "tile", "axes")
+    permutation, tile, axes = (
+        jnp.stack([getattr(one, name) for one in tilings])
+        for name in ("permutation", "tile", "axes")
     )
-    return TileAtlas(order, tile, axes, towards, centre, directions, exponent)
+    return TileAtlas(permutation, tile, axes, towards, center, directions, exponent)
 
 
 class TileFollower:
@@ -109,12 +129,13 @@ class TileFollower:
         if keep < 2:
             raise ValueError(f"expected keep of at least 2, this set and the next, got {keep}")
         self._atlas, self._transfer, self._keep = atlas, transfer, keep
+        self._diffuse = quantize(transfer)  # which all sets share
         self._sets: dict[int, TileSet] = {}  # the one last used at the end
         self._view = atlas.view(eye)
         self._use(self._view)
 
     def __call__(self, eye: Float[ArrayLike, " 3"]) -> TileSet:
-        """The set of the nearest view, or the one before until that is ready."""
+        """Return the set of the nearest view, or the one before until that is ready."""
         view = self._atlas.view(eye)
         if all(map(_is_ready, self._sets.values())):  # one at a time is under way
             self._use(view)
@@ -123,7 +144,7 @@ class TileFollower:
         return self._sets[self._view]
 
     def prepare(self, eyes: Float[ArrayLike, "n 3"]) -> int:
-        """Arranges the sets for these eyes now, and keeps them; their number."""
+        """Arrange the sets for these eyes now, keep them, and return their number."""
         views = list(dict.fromkeys(self._atlas.view(eye) for eye in np.asarray(eyes)))
         self._keep = max(self._keep, len(views) + 1)
         for view in views:
@@ -132,7 +153,9 @@ class TileFollower:
 
     def _use(self, view: int) -> TileSet:
         found = self._sets.pop(view, None)
-        self._sets[view] = found or self._atlas.arranged(self._transfer, view)
+        self._sets[view] = found or self._atlas.arranged(
+            self._transfer, view, diffuse=self._diffuse
+        )
         oldest = [v for v in self._sets if v not in (view, self._view)]
         for dropped in oldest[: max(len(self._sets) - self._keep, 0)]:
             del self._sets[dropped]

@@ -1,93 +1,302 @@
-"""The glossy lobe where it looks: sums over few directions, tile by tile of vertices."""
+"""Glossy shading with a few quadrature directions around each tile's mirrored direction."""
 
 import functools
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import ArrayLike, Float
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float, Int, Int8
 
 from .._core.linalg import matmul
 from .._core.xla import materialize
-from ..harmonics import degree_of, phong
-from ..transfer import Material, QuantizedTransfer, Transfer, shade_diffuse
+from ..harmonics import degree_of, evaluate, phong, rotate
+from ..transfer import AbstractTransfer, Material, Transfer, shade_diffuse
 from ..transfer._glossy_kernels import (
     block_sums,
     checked_eye,
-    checked_light,
     checked_material,
+    checked_one_light,
+    in_steps,
     mirrored,
+    rows_of,
 )
-from ._costs import full_cost, product_cost, sum_cost
-from ._result import AdaptiveResult
-from ._tile_sets import TileSet
+from ._local_rule import check_rule, local_rule
+from ._method import (
+    AbstractMethod,
+    check_known,
+    check_one_device,
+    check_one_exponent,
+    check_set,
+    check_whole_degree,
+    plain_transfer,
+)
+from ._result import AdaptiveResult, full_cost, product_cost, sum_cost
+from ._staged import diffuse_part
+from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling
+
+DIRECTIONS = 40
+EXPONENT = 32.0
 
 
-def shade_tiles(
-    light: Float[ArrayLike, "3 k"],
-    transfer: Transfer | QuantizedTransfer,
+class TileSet(eqx.Module):
+    """Holds a transfer in the order of a tiling, ready for frame after frame.
+
+    Made by `make_tiles`, `arrange` or a `TileAtlas`; called with a frame, it shades. It serves any
+    eye, and best the one it was made for. Sets of one mesh, number of tiles and block have the
+    same shapes, so that code compiled for one serves all.
+    """
+
+    tiling: Tiling
+    place: Int[Array, " v"]  # where in the permutation each vertex is
+    samples: Int8[Array, "blocks n b"] | Float[Array, "blocks n b"]
+    scales: Float[Array, "blocks n"]  # a value, in a tile's directions, is sample times scale
+    directions: Float[Array, "tiles n 3"]
+    basis: Float[Array, "k tiles n"]  # there
+    powers: Float[Array, "terms bands"]  # of the lobe around them, as `LocalRule` has it
+    lowest: Float[Array, ""]
+    positions: Float[Array, "3 places"]
+    normals: Float[Array, "3 places"]  # at unit length
+    diffuse: AbstractTransfer
+
+    @property
+    def num_points(self) -> int:
+        return len(self.place)
+
+    @property
+    def degree(self) -> int:
+        return degree_of(len(self.basis))
+
+    def __call__(
+        self,
+        light: Float[ArrayLike, "3 k"],
+        eye: Float[ArrayLike, " 3"],
+        material: Material,
+        *,
+        distant: bool = False,
+        normalized: bool = True,
+    ) -> AdaptiveResult:
+        """Shade a frame, with each tile's lobes summed in a few directions where they look.
+
+        `transfer.shade_glossy` sums light times transfer times lobe over directions all around, as
+        many as are exact: 350 at degree 10. The vertices of a tile mirror the eye to nearly the
+        same direction B, and a lobe is small away from it. So a tile has a few directions of its
+        own,
+
+            S = ρ_s Σ_n L(ω_n) lobe(B·ω_n) (A O)_n,
+
+        with weights A that make the most of them (`docs/adaptive_tiles.md`). No band of light,
+        transfer or lobe is dropped, and each vertex has its own B. There is no threshold; the
+        error changes at once only where another tile set takes over. The diffuse part is computed
+        in full. Not in Lee & Kim 2014. Experiment `leekim2014.table1` prints what it gains.
+
+        **Arguments**
+
+        - `light`, `eye`, `material`, `distant`, `normalized`: as for `transfer.shade_glossy`; one
+          light (3, K) of the transfer's degree, and one exponent. An eye or an exponent other than
+          those that the set was made for costs accuracy and no more.
+
+        **Returns** an `AdaptiveResult`; `active_fraction` is empty. Linear in light and albedos,
+        and differentiable in them, in the eye and in the exponent, forward and reverse; the
+        transfer's glossy part is a constant.
+
+        Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
+        """
+        count, dtype = self.num_points, self.basis.dtype
+        light = checked_one_light(light, count, self.degree, dtype)
+        check_whole_degree("tiles", light, self.degree)
+        eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
+        check_one_exponent(material, count)
+        check_one_device("A TileSet", self)
+        return _shade_tiles(light, eye, material, self, distant, normalized)
+
+
+def make_tiles(
+    transfer: Transfer,
     eye: Float[ArrayLike, " 3"],
-    material: Material,
-    tiles: TileSet,
     *,
     distant: bool = False,
-    normalized: bool = True,
-) -> AdaptiveResult:
-    """What `transfer.shade_glossy` gives, with each tile's lobes summed where they look.
-
-    `shade_glossy` sums light times transfer times lobe over directions all around, as many as
-    are exact: 350 at degree 10. The vertices of a tile mirror the eye to nearly the same
-    direction B, and a lobe is small away from it. So a tile has a few directions of its own,
-
-        S = ρ_s Σ_n L(ω_n) lobe(B·ω_n) (A O)_n,
-
-    with weights A that make the most of them (`docs/adaptive_tiles.md`). No band of light,
-    transfer or lobe is dropped, and each vertex has its own B. There is no threshold; the
-    error changes at once only where another tile set takes over. The diffuse part is computed in
-    full. Not in Lee & Kim 2014. Experiment
-    `leekim2014.table1` prints what it gains.
+    num_tiles: int = NUM_TILES,
+    block: int = BLOCK,
+    directions: int = DIRECTIONS,
+    exponent: float = EXPONENT,
+    quantized: bool = True,
+    diffuse: AbstractTransfer | None = None,
+) -> TileSet:
+    """Regroup and sample the transfer by reflected direction, for the view from `eye`.
 
     **Arguments**
 
-    - `light`, `eye`, `material`, `distant`, `normalized`: as for `shade_glossy`; one light (3, K)
-      of the transfer's degree, and one exponent.
-    - `transfer`: what `tiles` was made of, for the diffuse part; faster where `quantize` made
-      eight bits of it.
-    - `tiles`: from `make_tiles`, or `TileAtlas.nearest`. An eye or an exponent other than those it
-      was made for costs accuracy and no more.
+    - `transfer`: with known values.
+    - `eye`: a point, or with `distant` the direction to an eye far away.
+    - `num_tiles`: more are more exact.
+    - `block`: the number of vertices that a tile's size is a multiple of.
+    - `directions`: of each tile. More are more exact, and cost more per frame; as many as
+      `transfer.sample` takes leave no error.
+    - `exponent`: of the lobes to come. Others are less exact.
+    - `quantized`: whether samples and the diffuse part are rounded to eight bits; the error of the
+      samples' rounding does not show beside that of the directions.
+    - `diffuse`: the diffuse part, where it is there already, in any form.
 
-    **Returns** an `AdaptiveResult`; `kept` is empty. Linear in light and albedos, and
-    differentiable in them, in the eye and in the exponent, forward and reverse; the transfer's
-    glossy part is a constant.
+    **Returns** a `TileSet`, to be called with light, eye and material. It takes `directions`
+    numbers a vertex, and the diffuse part. Neither traceable nor differentiable; raises
+    `ValueError` for an eye that is no vector, for numbers below 1, for an exponent that is not
+    above -1, and for arrays on several devices.
 
-    Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points, eye = sphere.fibonacci(50).directions, jnp.asarray([0.0, -3.0, 0.0])
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> tiles = adaptive.make_tiles(made, eye, num_tiles=3, block=8)
+    >>> tiles(jnp.ones((3, 9)), eye, transfer.Material(0.5, 0.5, 32.0)).color.shape
+    (50, 3)
     """
-    count, dtype = transfer.num_points, tiles.basis.dtype
-    if tiles.place.shape != (count,) or tiles.degree != transfer.degree:
-        raise ValueError(
-            f"expected tiles of {count} vertices and degree {transfer.degree}, got "
-            f"{len(tiles.place)} and {tiles.degree}"
-        )
-    light = checked_light(light, count, transfer.degree, dtype)
-    if light.ndim != 2:
-        raise ValueError(f"expected one light (3, K) for all vertices, got shape {light.shape}")
-    if degree_of(light.shape[-1]) != tiles.degree:
-        raise ValueError(
-            f"expected a light of the tiles' degree, {tiles.degree}, got "
-            f"{degree_of(light.shape[-1])}"
-        )
-    eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
-    if material.exponent.ndim:
-        raise ValueError(f"expected one exponent, got one for each of {count} vertices")
-    return _shade_tiles(light, transfer, eye, material, tiles, distant, normalized)
+    check_rule(directions, exponent)
+    tiling = make_tiling(transfer, eye, distant=distant, num_tiles=num_tiles, block=block)
+    return arrange(
+        transfer,
+        tiling,
+        directions=directions,
+        exponent=exponent,
+        quantized=quantized,
+        diffuse=diffuse,
+    )
+
+
+def arrange(
+    transfer: Transfer,
+    tiling: Tiling,
+    *,
+    directions: int = DIRECTIONS,
+    exponent: float = EXPONENT,
+    quantized: bool = True,
+    diffuse: AbstractTransfer | None = None,
+) -> TileSet:
+    """Sample the transfer in the order of a tiling, in directions about each tile's own.
+
+    Other arguments and errors as for `make_tiles`; raises `ValueError` for a tiling of another
+    mesh too.
+
+    **Example**
+
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> tiling = adaptive.make_tiling(made, [0.0, -3.0, 0.0], num_tiles=3, block=8)
+    >>> adaptive.arrange(made, tiling, directions=9).samples.shape
+    (7, 9, 8)
+    """
+    check_rule(directions, exponent)
+    check_one_device("arrange", transfer)
+    check_known("arrange", transfer, tiling)
+    permutation, vertices = np.asarray(tiling.permutation), transfer.num_points
+    place = np.full(max(vertices, permutation.max() + 1), -1, np.int32)
+    place[permutation.ravel()] = np.arange(permutation.size, dtype=np.int32)
+    if len(place) != vertices or place.min() < 0:
+        held = np.count_nonzero(place >= 0)
+        raise ValueError(f"expected a tiling of {vertices} vertices, got one of {held}")
+    dtype = transfer.positions.dtype
+    rule = local_rule(transfer.degree, directions, float(exponent))
+    rule = tuple(jnp.asarray(part, dtype) for part in rule)
+    diffuse = diffuse_part(transfer, diffuse, quantized)
+    arranged = _arrange(transfer, tiling, jnp.asarray(place), rule, quantized)
+    return TileSet(tiling, *arranged, diffuse)
+
+
+@functools.partial(jax.jit, static_argnames="quantized")
+def _arrange(transfer, tiling, place, rule, quantized):
+    directions, rows, powers, lowest = rule
+    turns = _turns(tiling.axes)
+    directions = matmul(directions[None], jnp.swapaxes(turns, 1, 2))
+    rows = rotate(rows, turns[:, None])
+
+    def sampled(part):
+        vertices, tile = part
+        coefficients = transfer.coefficients.at[vertices].get(mode="promise_in_bounds")
+        samples = matmul(rows[tile], coefficients.T)
+        return in_steps(samples, 1) if quantized else (samples, jnp.ones_like(samples[:, 0]))
+
+    samples, scales = jax.lax.map(sampled, (tiling.permutation, tiling.tile))
+    basis = evaluate(directions, transfer.degree, axis=0)
+    order = tiling.permutation.reshape(-1)
+    positions, normals = rows_of(transfer.positions[order], transfer.normals[order])
+    return place, samples, scales, directions, basis, powers, lowest, positions, normals
+
+
+def _turns(axes: Float[Array, "tiles 3"]) -> Float[Array, "tiles 3 3"]:
+    """Builds rotations that take +z to each axis.
+
+    Duff et al. 2017, "Building an orthonormal basis, revisited".
+    """
+    x, y, z = axes.T
+    sign = jnp.where(z < 0, -1.0, 1.0).astype(axes.dtype)
+    a = -1 / (sign + z)
+    b = x * y * a
+    first = jnp.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=-1)
+    return jnp.stack([first, jnp.stack([b, sign + y * y * a, -y], axis=-1), axes], axis=-1)
+
+
+class Tiles(AbstractMethod):
+    """Shades glossily in a few directions around each tile's mirrored direction: see `TileSet`.
+
+    **Options**
+
+    - `tiles`: from `make_tiles` or a `TileAtlas`, of this transfer. Without them the others are
+      `make_tiles`' arguments, with the material's exponent where none is said, and they are made
+      anew in each call.
+    - `distant`, `normalized`: as for a call of a `TileSet`.
+
+    **Example**
+
+    >>> from jaxsh import adaptive
+    >>> adaptive.Tiles(directions=60).num_tiles
+    128
+    """
+
+    tiles: TileSet | None = None
+    num_tiles: int = eqx.field(static=True, default=NUM_TILES)
+    block: int = eqx.field(static=True, default=BLOCK)
+    directions: int = eqx.field(static=True, default=DIRECTIONS)
+    exponent: float | None = eqx.field(static=True, default=None)
+    quantized: bool = eqx.field(static=True, default=True)
+    distant: bool = eqx.field(static=True, default=False)
+    normalized: bool = eqx.field(static=True, default=True)
+
+    def __call__(
+        self,
+        light: Float[ArrayLike, "3 k"],
+        transfer: AbstractTransfer,
+        eye: Float[ArrayLike, " 3"],
+        material: Material,
+    ) -> AdaptiveResult:
+        tiles = self.tiles
+        if tiles is None:
+            check_one_exponent(material, transfer.num_points)
+            check_known("Tiles without a tile set", transfer, eye, material)
+            exponent = float(material.exponent) if self.exponent is None else self.exponent
+            tiles = make_tiles(
+                plain_transfer("tiles", transfer),
+                eye,
+                distant=self.distant,
+                num_tiles=self.num_tiles,
+                block=self.block,
+                directions=self.directions,
+                exponent=exponent,
+                quantized=self.quantized,
+            )
+        check_set("tiles", tiles.num_points, tiles.degree, transfer)
+        return tiles(light, eye, material, distant=self.distant, normalized=self.normalized)
 
 
 @functools.partial(jax.jit, static_argnames=("distant", "normalized"))
-def _shade_tiles(light, transfer, eye, material, tiles, distant, normalized):
-    tile, (blocks, size) = tiles.tiling.tile, tiles.tiling.order.shape
+def _shade_tiles(light, eye, material, tiles, distant, normalized):
+    tile, (blocks, size) = tiles.tiling.tile, tiles.tiling.permutation.shape
     width, count, directions = tiles.basis.shape
     basis = tiles.basis.reshape(width, -1)
     lights = matmul(light, basis).reshape(3, count, directions)
-    weights = jnp.swapaxes(lights, 0, 1)[tile] * tiles.steps[:, None]
+    weights = jnp.swapaxes(lights, 0, 1)[tile] * tiles.scales[:, None]
 
     axis = mirrored(eye, tiles.positions, tiles.normals, distant).reshape(3, blocks, 1, size)
     zonal = phong(material.exponent, tiles.degree, normalized=normalized)
@@ -100,12 +309,12 @@ def _shade_tiles(light, transfer, eye, material, tiles, distant, normalized):
 
     albedo = material.specular
     albedo = albedo if albedo.ndim == 2 else albedo.reshape(1, -1)
-    color = glossy * albedo + shade_diffuse(light, transfer, material.diffuse)
+    color = glossy * albedo + shade_diffuse(light, tiles.diffuse, material.diffuse)
     degree, terms = tiles.degree, len(tiles.powers)
-    spent = product_cost("diffuse", 0, degree, degree)
-    spent += sum_cost(degree, degree, directions, terms)
-    spent += count * directions * 3 * width / len(tiles.place) / full_cost(degree)  # of the light
-    return AdaptiveResult(color, {}, jnp.asarray(spent, color.dtype))
+    cost = product_cost("diffuse", 0, degree, degree)
+    cost += sum_cost(degree, degree, directions, terms)
+    cost += count * directions * 3 * width / len(tiles.place) / full_cost(degree)  # of the light
+    return AdaptiveResult(color, {}, jnp.asarray(cost, color.dtype))
 
 
 def _lobed(axis, directions, lobe, lowest, samples):

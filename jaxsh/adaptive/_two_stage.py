@@ -1,81 +1,94 @@
 """One decision at a middle degree, then all or nothing."""
 
-from typing import Unpack
-
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
+from .._core.checks import check_degree
 from .._core.xla import materialize
 from ..harmonics import degree_of, num_coefficients
-from ..transfer import Material, SampledTransfer, Transfer
+from ..transfer import AbstractTransfer, Material, SampledTransfer
 from ..transfer._glossy_kernels import lobe_polynomial, lobe_products, mirrored
-from ._compact import compacted
-from ._costs import product_cost, sum_cost
 from ._filter import Filter, albedos, threshold
-from ._options import FilterOptions, checked
-from ._refine import grow, smooth
-from ._result import AdaptiveResult
-from ._roi import seen_as_changed
+from ._levels import AbstractFilter
+from ._method import check_one_device, checked_frame, plain_transfer
+from ._regions import compacted, grow, seen_as_changed, smooth
+from ._result import AdaptiveResult, product_cost, sum_cost
 from ._staged import StagedTransfer, row_products, stage
 
 
-def shade_two_stage(
-    light: Float[ArrayLike, "3 k"],
-    transfer: Transfer | StagedTransfer,
-    eye: Float[ArrayLike, " 3"],
-    material: Material,
-    *,
-    middle: int | None = None,
-    **options: Unpack[FilterOptions],
-) -> AdaptiveResult:
-    """Everyone at a middle degree; where that changed the base, the full degree.
+class TwoStage(AbstractFilter):
+    """Shades everyone at a middle degree; where that changed the base, at the full degree.
 
     Not in the paper, whose levels it replaces by one. Each degree is computed as
     `transfer.shade_glossy` does it, with light, transfer and lobe cut to that degree.
 
-    **Arguments** are those of `shade_masks`, and
+    **Options** are those of `Masks` but for `diffuse_threshold`, and
 
-    - `transfer`: for frame after frame, what `stage` made of it, for the same degrees.
-    - `middle`: degree of the first stage, from `base` to the light's (default: what was staged,
-      or three fifths of the light's).
+    - `middle`: degree of the first stage, from `base` to the light's (default: the one that was
+      staged, or three fifths of the light's).
+
+    Called with a frame as `shade` is; for frame after frame, give it the result of `stage` in
+    place of the transfer, for the same degrees, or it stages on the way.
 
     The decision is on the glossy part alone: the diffuse part is computed in full for all, which
-    costs less than to pick, so that `diffuse_threshold` is not looked at. `outside="base"` leaves
-    those that are not recomputed at the base, else they are left at the middle degree. `kept` has
-    one share, under "specular". The first stage knows the change of everyone, so with `rings`
-    whole rings join, without a test.
+    costs less than to pick. `fallback="base"` leaves those that are not recomputed at the base,
+    else they are left at the middle degree. `active_fraction` has one share, under "specular". The
+    first stage knows the change of everyone, so with `rings` whole rings join, without a test.
 
-    **Returns** an `AdaptiveResult`. Differentiable as `shade_masks` is. Pays against products
-    with the light's matrix; against `shade_glossy` of a sampled transfer only where very few
-    vertices are recomputed, which is not so at the paper's threshold. Experiment
-    `leekim2014.table1` prints both.
+    **Returns** an `AdaptiveResult`. Differentiable as `Masks` is. Pays against products with the
+    light's matrix; against `shade_glossy` of a sampled transfer only where very few vertices are
+    recomputed, which is not so at the paper's threshold. Experiment `leekim2014.table1` prints
+    both.
 
-    Raises `ValueError` for shapes and options that do not fit, and for degrees that were not
-    staged.
+    Raises `ValueError` for shapes and options that do not fit, for degrees that were not staged,
+    and for arrays on several devices, since it gathers vertices from all over the mesh.
+
+    **Example**
+
+    >>> from jaxsh import adaptive
+    >>> adaptive.TwoStage(middle=4).threshold
+    0.02
     """
-    staged = transfer if isinstance(transfer, StagedTransfer) else None
-    plain = staged.transfer if staged else transfer
-    light, plain, eye, material, settings, previous = checked(
-        light, plain, eye, material, **options
-    )
-    target = degree_of(light.shape[-1])
-    if staged is None:
-        staged = stage(plain, target, middle=middle, base=settings.base, quantized=False)
-    middle = staged.middle.degree if middle is None else middle
-    wanted = settings.base, middle, target
-    if wanted != staged.degrees:
-        raise ValueError(
-            f"expected the degrees that were staged as base, middle and the light's, "
-            f"{staged.degrees}, got {wanted}"
-        )
-    return _two_stage(light, staged, eye, material, settings, previous)
+
+    middle: int | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self):
+        if self.middle is not None:
+            check_degree(self.middle)
+
+    def __call__(
+        self,
+        light: Float[ArrayLike, "3 k"],
+        transfer: AbstractTransfer,
+        eye: Float[ArrayLike, " 3"],
+        material: Material,
+    ) -> AdaptiveResult:
+        check_one_device("TwoStage", transfer)
+        plain = plain_transfer("two_stage", transfer)
+        light, eye, material = checked_frame(light, plain, eye, material)
+        settings = self.settings(light, 0.0)
+        target = degree_of(light.shape[-1])
+        if isinstance(transfer, StagedTransfer):
+            staged = transfer
+        else:
+            staged = stage(plain, target, middle=self.middle, base=self.base, quantized=False)
+        middle = staged.middle.degree if self.middle is None else self.middle
+        wanted = self.base, middle, target
+        if wanted != staged.degrees:
+            raise ValueError(
+                f"expected the degrees that were staged as base, middle and the light's, "
+                f"{staged.degrees}, got {wanted}"
+            )
+        previous = self.remembered(plain.num_points)
+        return _two_stage(light, staged, eye, material, settings, previous)
 
 
 @jax.jit
 def _two_stage(light, staged, eye, material, settings: Filter, previous):
     transfer, (base, middle, target) = staged.transfer, staged.degrees
-    count = len(transfer.positions)
+    count = staged.num_points
     axis = mirrored(eye, staged.base.positions, staged.base.normals, settings.distant)
     albedo = albedos(material, count)
 
@@ -96,24 +109,24 @@ def _two_stage(light, staged, eye, material, settings: Filter, previous):
         threshold("specular", target, settings, previous, count),
         jax.lax.stop_gradient(settings.exposure * albedo["specular"]),
     )
-    kept = jnp.mean(region, dtype=basic.dtype)
+    recomputed = jnp.mean(region, dtype=basic.dtype)
     if settings.rings:
         # All changes are known, and those that are seen are inside already: whole rings join.
         region = grow(region, transfer.neighbors, lambda fringe: fringe, settings.rings)
-    outside, shown = (first, middle) if settings.outside == "level" else (basic, base)
-    glossy = jnp.where(region[None], compacted(second, region), outside)
+    rest, shown = (first, middle) if settings.fallback == "level" else (basic, base)
+    glossy = jnp.where(region[None], compacted(second, region), rest)
     if settings.smoothing:
         glossy = basic + smooth(glossy - basic, region, transfer.neighbors)
     irradiance = staged.diffuse.irradiances(light).T
     color = albedo["specular"] * glossy + albedo["diffuse"] * irradiance
 
-    reached = jnp.where(region, jnp.asarray(target, jnp.int32), jnp.asarray(shown, jnp.int32))
+    degrees = jnp.where(region, jnp.asarray(target, jnp.int32), jnp.asarray(shown, jnp.int32))
     stages = [sum_cost(one.degree, target) for one in (staged.base, staged.middle)]
     return AdaptiveResult(
         color=color.T,
-        kept={"specular": kept},
-        spent=sum(stages)
+        active_fraction={"specular": recomputed},
+        relative_cost=sum(stages)
         + product_cost("diffuse", 0, target, target)
         + sum_cost(target, target) * jnp.mean(region, dtype=basic.dtype),
-        reached={"specular": reached, "diffuse": jnp.full(count, target, jnp.int32)},
+        shown_degree={"specular": degrees, "diffuse": jnp.full(count, target, jnp.int32)},
     )

@@ -30,10 +30,10 @@ def compute_specular(level, matrix, kernel, transfer):
     return level_specular
 
 
-def multi_level_filtering(compute, albedo, base_level, target, threshold, outside):
+def multi_level_filtering(compute, albedo, base_level, target, threshold, fallback):
     """Algorithm 1 for one vertex: (what is shown, degree that is shown, levels it stayed in).
 
-    `outside` is what a vertex shows that left: all that was added before the test, as printed
+    `fallback` is what a vertex shows that left: all that was added before the test, as printed
     ("level"), or only what was added while it stayed inside ("base").
     """
     base = sum(compute(level) for level in range(base_level + 1))
@@ -41,7 +41,7 @@ def multi_level_filtering(compute, albedo, base_level, target, threshold, outsid
     for level in range(base_level + 1, target + 1):
         diff = diff + compute(level)
         inside = np.abs(albedo * diff).max() >= threshold  # printed as diff < T
-        if inside or outside == "level":
+        if inside or fallback == "level":
             shown, reached = diff, level
         if not inside:
             break

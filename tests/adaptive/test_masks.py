@@ -8,7 +8,7 @@ import pytest
 from jax.test_util import check_grads
 
 from jaxsh import harmonics
-from jaxsh.adaptive import _filter, shade, shade_levels, shade_masks
+from jaxsh.adaptive import Levels, Masks, _filter, shade
 from jaxsh.transfer import Material, Transfer, shade_glossy
 
 V, TARGET = 40, 4
@@ -36,12 +36,12 @@ def scene(rng, dtype="float64"):
 
 
 # The two programs that most tests share: each reading of algorithm 1, one of them refined.
-REFINED = {"outside": "level", "rings": 3}
-PLAIN = {"outside": "base", "rings": 0}
-METHODS = pytest.mark.parametrize("method", ["masks", "levels"])
+REFINED = {"fallback": "level", "rings": 3}
+PLAIN = {"fallback": "base", "rings": 0}
+METHODS = pytest.mark.parametrize("method", [Masks, Levels])
 
 
-def twin(light, made, eye, material, *, base, thresholds, outside, exposure, rings):
+def twin(light, made, eye, material, *, base, thresholds, fallback, exposure, rings):
     """Colour, degrees reached and shares kept, from the appendix."""
     light, transfer = np.asarray(light, np.float64), np.asarray(made.coefficients, np.float64)
     matrix = np.asarray(harmonics.product_matrix(light))
@@ -69,7 +69,12 @@ def twin(light, made, eye, material, *, base, thresholds, outside, exposure, rin
         shown, degrees, stayed = zip(
             *[
                 appendix.multi_level_filtering(
-                    computes[kind](v), exposure * albedo[v], base, TARGET, thresholds[kind], outside
+                    computes[kind](v),
+                    exposure * albedo[v],
+                    base,
+                    TARGET,
+                    thresholds[kind],
+                    fallback,
                 )
                 for v in range(V)
             ],
@@ -101,19 +106,23 @@ def test_masks_follow_the_appendix(rng, options):
     thresholds = {"diffuse": 0.12, "specular": 0.15}
     color, reached, kept = twin(*inputs, base=2, thresholds=thresholds, exposure=1.3, **options)
     options = {"threshold": 0.15, "diffuse_threshold": 0.12, "exposure": 1.3} | options
-    masks = shade_masks(*inputs, **options)
-    levels = shade_levels(*inputs, **options)
+    masks = shade(*inputs, Masks(**options))
+    levels = shade(*inputs, Levels(**options))
     for kind in ("diffuse", "specular"):
         assert 0 < kept[kind][-1] <= kept[kind][0] < 1
-        np.testing.assert_allclose(masks.kept[kind], kept[kind], rtol=1e-12)
-        np.testing.assert_array_equal(masks.reached[kind], reached[kind])
+        np.testing.assert_allclose(masks.active_fraction[kind], kept[kind], rtol=1e-12)
+        np.testing.assert_array_equal(masks.shown_degree[kind], reached[kind])
     np.testing.assert_allclose(masks.color, color, rtol=0, atol=1e-12)
     np.testing.assert_allclose(levels.color, masks.color, rtol=0, atol=1e-13)
     assert jax.tree.all(
-        jax.tree.map(np.array_equal, (levels.kept, levels.reached), (masks.kept, masks.reached))
+        jax.tree.map(
+            np.array_equal,
+            (levels.active_fraction, levels.shown_degree),
+            (masks.active_fraction, masks.shown_degree),
+        )
     )
-    assert masks.spent == pytest.approx(1)
-    assert 0 < levels.spent < 1
+    assert masks.relative_cost == pytest.approx(1)
+    assert 0 < levels.relative_cost < 1
 
 
 @METHODS
@@ -122,14 +131,14 @@ def test_thresholds_at_their_ends_and_a_base_that_is_all(rng, method):
     full = shade_glossy(*inputs)
 
     def filtered(**options):
-        return shade(*inputs, method=method, **options)
+        return shade(*inputs, method(**options))
 
     everyone = filtered(threshold=0.0, diffuse_threshold=0.0, **REFINED)
     nobody = filtered(threshold=np.inf, diffuse_threshold=np.inf, **PLAIN)
     np.testing.assert_allclose(everyone.color, full, rtol=0, atol=1e-12)
-    assert all((kept == 1).all() for kept in everyone.kept.values())
-    assert all((kept == 0).all() for kept in nobody.kept.values())
-    assert all((reached == 2).all() for reached in nobody.reached.values())
+    assert all((kept == 1).all() for kept in everyone.active_fraction.values())
+    assert all((kept == 0).all() for kept in nobody.active_fraction.values())
+    assert all((reached == 2).all() for reached in nobody.shown_degree.values())
     never = {"diffuse": np.inf, "specular": np.inf}
     base, *_ = twin(*inputs, base=2, thresholds=never, exposure=1.0, **PLAIN)
     np.testing.assert_allclose(nobody.color, base, rtol=0, atol=1e-12)
@@ -138,8 +147,8 @@ def test_thresholds_at_their_ends_and_a_base_that_is_all(rng, method):
 
 def test_filtering_in_float32(rng):
     inputs = scene(rng, "float32")
-    result = shade_levels(*inputs, threshold=0.0, diffuse_threshold=0.0, **PLAIN)
-    assert result.color.dtype == result.spent.dtype == np.float32
+    result = shade(*inputs, Levels(threshold=0.0, diffuse_threshold=0.0, **PLAIN))
+    assert result.color.dtype == result.relative_cost.dtype == np.float32
     np.testing.assert_allclose(result.color, shade_glossy(*inputs), rtol=0, atol=3e-6)
 
 
@@ -148,16 +157,16 @@ def test_the_boundary_is_smoothed_as_in_figure_7(rng):
     # The glossy part alone at an albedo of one shows what the region adds.
     white = Material(0 * material.diffuse, 0 * material.specular + 1, material.exponent)
     inputs, options = (light, made, eye, white), {"threshold": 0.5, **PLAIN}
-    base = shade_masks(*inputs, **options | {"threshold": np.inf}).color
-    sharp = shade_masks(*inputs, **options)
-    smooth = shade_masks(*inputs, smoothing=True, **options)
-    region = np.flatnonzero(sharp.reached["specular"] == TARGET)
+    base = shade(*inputs, Masks(**options | {"threshold": np.inf})).color
+    sharp = shade(*inputs, Masks(**options))
+    smooth = shade(*inputs, Masks(smoothing=True, **options))
+    region = np.flatnonzero(sharp.shown_degree["specular"] == TARGET)
     # A vertex that left below the target is outside: smoothing replaces what it had kept.
     near = np.asarray(made.neighbors)
     expected = appendix.smooth_boundary(np.asarray(sharp.color - base), region, near)
     assert 0 < np.count_nonzero((expected != sharp.color - base).any(axis=1)) < V
     np.testing.assert_allclose(smooth.color - base, expected, rtol=0, atol=1e-12)
-    assert jax.tree.all(jax.tree.map(np.array_equal, sharp.reached, smooth.reached))
+    assert jax.tree.all(jax.tree.map(np.array_equal, sharp.shown_degree, smooth.shown_degree))
 
 
 def test_hysteresis_holds_whom_the_last_frame_held(rng):
@@ -165,16 +174,18 @@ def test_hysteresis_holds_whom_the_last_frame_held(rng):
 
     def at(threshold, **options):
         limits = {"threshold": threshold, "diffuse_threshold": threshold}
-        return shade_masks(*inputs, **limits, **PLAIN, **options)
+        return shade(*inputs, Masks(**limits, **PLAIN, **options))
 
     low, high = at(0.1), at(0.2)
-    assert float(high.kept["specular"][-1]) < float(low.kept["specular"][-1])
+    assert float(high.active_fraction["specular"][-1]) < float(low.active_fraction["specular"][-1])
     # Those that the last frame let go come back at the threshold alone.
-    for previous, leave, expected in ((low, 0.5, low), (low, 1.0, high), (high, 0.5, high)):
-        held = at(0.2, previous=previous, leave=leave)
-        for kind in held.kept:
-            np.testing.assert_array_equal(held.kept[kind], expected.kept[kind])
-            np.testing.assert_array_equal(held.reached[kind], expected.reached[kind])
+    for previous, hysteresis, expected in ((low, 0.5, low), (low, 1.0, high), (high, 0.5, high)):
+        held = at(0.2, previous=previous, hysteresis=hysteresis)
+        for kind in held.active_fraction:
+            np.testing.assert_array_equal(
+                held.active_fraction[kind], expected.active_fraction[kind]
+            )
+            np.testing.assert_array_equal(held.shown_degree[kind], expected.shown_degree[kind])
 
 
 @pytest.mark.slow
@@ -184,7 +195,7 @@ def test_filtered_derivatives(rng):
     def color(light, specular):
         changed = Material(material.diffuse, specular, material.exponent)
         limits = {"threshold": 0.15, "diffuse_threshold": 0.12}
-        return shade_levels(light, made, eye, changed, **limits, **PLAIN).color
+        return shade(light, made, eye, changed, Levels(**limits, **PLAIN)).color
 
     arguments = light, material.specular
     check_grads(color, arguments, order=1, modes=["fwd", "rev"], rtol=1e-6, atol=1e-6)
@@ -192,10 +203,10 @@ def test_filtered_derivatives(rng):
 
 def test_a_region_of_another_size_is_no_other_program(rng):
     inputs = scene(rng)
-    shade_levels(*inputs, **PLAIN)
+    shade(*inputs, Levels(**PLAIN))
     before = _filter.filtered._cache_size()
     spent = [
-        float(shade_levels(*inputs, threshold=threshold, **PLAIN).spent)
+        float(shade(*inputs, Levels(threshold=threshold, **PLAIN)).relative_cost)
         for threshold in (0.0, 0.1, 0.3, 10.0)
     ]
     assert _filter.filtered._cache_size() == before
@@ -206,8 +217,8 @@ def test_a_region_of_another_size_is_no_other_program(rng):
 def test_levels_map_over_lights(rng):
     light, *others = scene(rng)
     lights = jnp.stack([light, 2 * light])
-    mapped = jax.vmap(lambda light: shade_levels(light, *others, **PLAIN).color)(lights)
-    alone = jnp.stack([shade_levels(light, *others, **PLAIN).color for light in lights])
+    mapped = jax.vmap(lambda light: shade(light, *others, Levels(**PLAIN)).color)(lights)
+    alone = jnp.stack([shade(light, *others, Levels(**PLAIN)).color for light in lights])
     np.testing.assert_allclose(mapped, alone, rtol=1e-12, atol=1e-13)
 
 
@@ -216,11 +227,12 @@ def test_levels_map_over_lights(rng):
     [
         ({"base": 5}, "base from 0 to the light's degree, 4, got 5"),
         ({"rings": -1}, "rings >= 0, got -1"),
-        ({"outside": "middle"}, "outside to be one of .* got 'middle'"),
+        ({"fallback": "middle"}, "fallback to be one of .* got 'middle'"),
+        ({"fallback": "bas"}, "did you mean 'base'"),
         ({"threshold": -1.0}, "threshold must be >= 0, got -1"),
         ({"threshold": np.ones(3)}, r"threshold as a number, got shape \(3,\)"),
     ],
 )
 def test_bad_filter_options_are_refused(unchecked, rng, options, message):
     with pytest.raises(ValueError, match=message):
-        shade_masks(*scene(rng), **options)
+        shade(*scene(rng), Masks(**options))

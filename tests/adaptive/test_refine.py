@@ -6,8 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsh.adaptive._compact import BLOCK, compacted, everywhere
-from jaxsh.adaptive._refine import grow, smooth
+from jaxsh.adaptive._regions import BLOCK, compacted, everywhere, grow, smooth
 
 
 def table(edges, count):

@@ -5,53 +5,83 @@ import pytest
 from test_masks import scene
 
 from jaxsh import adaptive
-from jaxsh.transfer import Material, quantize, shade_glossy
+from jaxsh.transfer import Material, quantize, sample, shade_diffuse, shade_glossy
 
 
 @pytest.mark.parametrize(("quantized", "tolerance"), [(False, 1e-11), (True, 6e-3)])
 def test_every_method_at_its_finest_is_the_full_computation(rng, quantized, tolerance):
     light, made, eye, material = scene(rng)
     material = Material(material.diffuse, material.specular, 9.0)
-    everyone = {"threshold": 0.0, "diffuse_threshold": 0.0}
-    probes = adaptive.make_probes(made, share=0.2, quantized=quantized)
+    anchors = adaptive.make_anchors(made, share=0.2, quantized=quantized)
     tiles = adaptive.make_tiles(made, eye, directions=500, quantized=quantized)
-    options = {
-        "two_stage": everyone,
-        "probes": {"probes": probes, "threshold": 0.0},
-        "tiles": {"tiles": tiles},
-    }
-    transfers = {"two_stage": adaptive.stage(made, quantized=quantized)}
+    methods = [
+        adaptive.TwoStage(threshold=0.0),
+        adaptive.Anchors(anchors, threshold=0.0),
+        adaptive.Tiles(tiles),
+    ]
     if not quantized:
-        options |= {"masks": everyone, "levels": everyone}
+        everyone = {"threshold": 0.0, "diffuse_threshold": 0.0}
+        methods += [adaptive.Masks(**everyone), adaptive.Levels(**everyone)]
+    staged = adaptive.stage(made, quantized=quantized)
     full = shade_glossy(light, made, eye, material)
-    for method, own in options.items():
-        given = transfers.get(method, quantize(made) if quantized else made)
-        result = adaptive.shade(light, given, eye, material, method=method, **own)
-        worst = tolerance * np.abs(full).max()
-        np.testing.assert_allclose(result.color, full, rtol=0, atol=worst, err_msg=method)
-        assert result.spent.shape == ()
-        assert result.spent > 0
+    for method in methods:
+        given = staged if isinstance(method, adaptive.TwoStage) else made
+        result = adaptive.shade(light, given, eye, material, method)
+        worst, name = tolerance * np.abs(full).max(), type(method).__name__
+        np.testing.assert_allclose(result.color, full, rtol=0, atol=worst, err_msg=name)
+        assert result.relative_cost.shape == ()
+        assert result.relative_cost > 0
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("method", "message"),
     [
-        ({"method": "magic"}, "method to be one of masks, .*, got 'magic'"),
-        ({"method": "tiles"}, "'tiles' needs tiles=, a TileSet made by make_tiles, got NoneType"),
-        ({"method": "probes", "probes": 3}, "needs probes=, a ProbeSet made by make_p.* got int"),
+        ("magic", "no method 'magic'; it has masks, levels, two_stage, anchors, tiles"),
+        ("level", "no method 'level'; did you mean 'levels'?"),
+        ("two-stage", "did you mean 'two_stage'?"),
     ],
 )
-def test_unknown_methods_and_missing_sets_are_refused(unchecked, rng, options, message):
+def test_unknown_methods_are_refused_with_the_nearest(unchecked, rng, method, message):
     with pytest.raises(ValueError, match=message):
-        adaptive.shade(*scene(rng), **options)
+        adaptive.shade(*scene(rng), method)
 
 
-def test_options_of_another_method_are_refused(unchecked, rng):
-    with pytest.raises(TypeError, match="middle"):
-        adaptive.shade(*scene(rng), method="masks", middle=3)
+@pytest.mark.parametrize(
+    ("method", "option", "nearest"),
+    [
+        (adaptive.Masks, "treshold", "threshold"),
+        (adaptive.Levels, "hysteresys", "hysteresis"),
+        (adaptive.TwoStage, "midle", "middle"),
+        (adaptive.Anchors, "shares", "share"),
+        (adaptive.Tiles, "num_tile", "num_tiles"),
+    ],
+)
+def test_unknown_options_are_refused_with_the_nearest(unchecked, method, option, nearest):
+    with pytest.raises(TypeError, match=f"no option '{option}'; did you mean '{nearest}'?"):
+        method(**{option: 1})
+    with pytest.raises(TypeError, match=f"no option 'magic'; it has .*{nearest}"):
+        method(magic=1)
 
 
-def test_methods_of_levels_refuse_eight_bits(unchecked, rng):
+def test_a_name_stands_for_the_defaults(rng):
+    frame = scene(rng)
+    named, typed = (adaptive.shade(*frame, way) for way in ("two_stage", adaptive.TwoStage()))
+    np.testing.assert_array_equal(named.color, typed.color)
+
+
+def test_forms_that_a_method_cannot_take_are_refused(unchecked, rng):
     light, made, eye, material = scene(rng)
-    with pytest.raises(ValueError, match="method 'levels' needs the transfer's coefficients"):
-        adaptive.shade(light, quantize(made), eye, material, method="levels")
+    with pytest.raises(ValueError, match="not its eight bits"):
+        adaptive.shade(light, quantize(made), eye, material, "levels")
+    with pytest.raises(ValueError, match="'masks' needs the transfer's coefficients, got a Sampl"):
+        adaptive.shade(light, sample(made), eye, material, "masks")
+
+
+def test_a_staged_transfer_is_a_transfer(rng):
+    light, made, _, material = scene(rng)
+    staged = adaptive.stage(made, quantized=False)
+    assert (staged.num_points, staged.degree, staged.dtype) == (40, 4, made.dtype)
+    plain = shade_diffuse(light, made, material.diffuse)
+    np.testing.assert_array_equal(shade_diffuse(light, staged, material.diffuse), plain)
+    own = rng.normal(size=(40, 3, 25))
+    np.testing.assert_array_equal(shade_diffuse(own, staged, 1.0), shade_diffuse(own, made, 1.0))

@@ -5,11 +5,19 @@ import numpy as np
 import pytest
 
 from jaxsh import harmonics, sphere, transfer
-from jaxsh.adaptive import _local_rule, _tiles
-from jaxsh.adaptive._tile_atlas import TileFollower, make_tile_atlas
-from jaxsh.adaptive._tile_sets import Tiling, arrange, make_tiles, make_tiling
-from jaxsh.adaptive._tiles import shade_tiles
-from jaxsh.transfer._glossy_kernels import product_nodes, reflected
+from jaxsh.adaptive import (
+    TileFollower,
+    Tiles,
+    Tiling,
+    _local_rule,
+    _tiles,
+    arrange,
+    make_tile_atlas,
+    make_tiles,
+    make_tiling,
+    shade,
+)
+from jaxsh.transfer._glossy_kernels import product_nodes
 
 COUNT, DEGREE = 300, 3
 WIDTH = (DEGREE + 1) ** 2
@@ -47,9 +55,9 @@ def test_tiles_are_exact_in_exact_directions(ball, light, dtype, tolerance):
     """At degree 3 there are 38, fewer than are taken."""
     ball, light, material = cast((ball, light, MATERIAL), dtype)
     eye = jnp.asarray(EYE, dtype)
-    tiles = make_tiles(ball, eye, count=5, block=16, quantized=False)
+    tiles = make_tiles(ball, eye, num_tiles=5, block=16, quantized=False)
     assert tiles.samples.shape[1] == 38
-    result = shade_tiles(light, ball, eye, material, tiles)
+    result = tiles(light, eye, material)
     assert result.color.dtype == dtype
     full = transfer.shade_glossy(light, ball, eye, material)
     np.testing.assert_allclose(result.color, full, atol=tolerance)
@@ -68,25 +76,25 @@ def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolera
     )
     made = eqx.tree_at(lambda t: t.positions, made, jnp.nan_to_num(normals))
     light, material = jnp.asarray(rng.normal(size=(3, 25))), transfer.Material(0.0, 1.0, exponent)
-    tiles = make_tiles(made, EYE, count=3, block=16, exponent=exponent, quantized=False)
+    tiles = make_tiles(made, EYE, num_tiles=3, block=16, exponent=exponent, quantized=False)
     eyes = jnp.asarray([EYE, EYE + 0.2])
     cast_ = [cast(x, dtype) for x in (light, made, eyes, material, tiles)]
 
     def color(eye):
-        return shade_tiles(cast_[0], cast_[1], eye, *cast_[3:]).color
+        return cast_[4](cast_[0], eye, cast_[3]).color
 
     ours = jax.vmap(color)(cast_[2])
     rule = _local_rule.local_rule(degree, 40, exponent)
     lobe = rule.powers @ np.asarray(harmonics.phong(exponent, degree, normalized=True))
     samples = np.asarray(tiles.samples)
     for eye, got in zip(eyes, np.asarray(ours), strict=True):
-        axis = np.asarray(reflected(eye, made.positions, made.normals, False)).T
+        axis = np.asarray(transfer.reflected_direction(eye, made.positions, made.normals))
         for tile, pole in enumerate(tiles.tiling.axes):
             at = np.asarray(tiles.directions[tile])
             np.testing.assert_allclose(at @ pole, rule.directions[:, 2], atol=1e-12)
             lights = np.asarray(harmonics.evaluate(at, degree) @ light.T)
             for block in np.flatnonzero(np.asarray(tiles.tiling.tile) == tile):
-                members = np.asarray(tiles.tiling.order)[block]
+                members = np.asarray(tiles.tiling.permutation)[block]
                 cosines = np.maximum(axis[members] @ at.T, rule.lowest)
                 lobes = np.polynomial.polynomial.polyval(cosines - rule.middle, lobe)
                 expected = (lobes * samples[block].T) @ lights
@@ -98,8 +106,8 @@ def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolera
 def test_tiles_with_albedos_per_vertex(ball, light, rng):
     albedos = [jnp.asarray(rng.uniform(size=(COUNT, channels))) for channels in (3, 1)]
     material = transfer.Material(*albedos, jnp.asarray(8.0))
-    tiles = make_tiles(ball, EYE, distant=True, count=5, block=16, quantized=False)
-    result = shade_tiles(light, ball, EYE, material, tiles, distant=True, normalized=False)
+    tiles = make_tiles(ball, EYE, distant=True, num_tiles=5, block=16, quantized=False)
+    result = tiles(light, EYE, material, distant=True, normalized=False)
     full = transfer.shade_glossy(light, ball, EYE, material, distant=True, normalized=False)
     np.testing.assert_allclose(result.color, full, atol=1e-14)
 
@@ -109,8 +117,8 @@ def test_error_falls_with_the_directions(ball, light):
     full = transfer.shade_glossy(light, ball, EYE, material)
     errors = []
     for directions in (8, 16, 32):
-        tiles = make_tiles(ball, EYE, count=24, block=1, directions=directions, exponent=8.0)
-        color = shade_tiles(light, ball, EYE, material, tiles).color
+        tiles = make_tiles(ball, EYE, num_tiles=24, block=1, directions=directions, exponent=8.0)
+        color = tiles(light, EYE, material).color
         errors.append(np.sqrt(np.mean((color - full) ** 2)) / np.std(full))
     assert errors[0] < 0.12
     assert errors[1] < 0.1
@@ -120,11 +128,11 @@ def test_error_falls_with_the_directions(ball, light):
 def test_tiles_of_another_view_are_less_exact_and_no_more(ball, light):
     """The lobe has few terms where its directions are, and must not run away elsewhere."""
     material = transfer.Material(jnp.asarray(0.0), jnp.asarray(1.0), jnp.asarray(8.0))
-    tiles = make_tiles(ball, EYE, count=24, block=1, directions=32, exponent=8.0)
+    tiles = make_tiles(ball, EYE, num_tiles=24, block=1, directions=32, exponent=8.0)
     assert tiles.lowest > -1
     for eye in (-EYE, EYE[::-1]):
         full = transfer.shade_glossy(light, ball, eye, material)
-        color = shade_tiles(light, ball, eye, material, tiles).color
+        color = tiles(light, eye, material).color
         assert np.sqrt(np.mean((color - full) ** 2)) < 0.5 * np.std(full)
 
 
@@ -183,35 +191,37 @@ def test_a_rule_of_all_directions_is_the_exact_one():
     np.testing.assert_allclose(bands, exact, atol=1e-13)
 
 
-def test_quantized_samples_are_a_step_s_half_off(ball, light):
-    plain, rounded = (make_tiles(ball, EYE, count=5, block=16, quantized=q) for q in (False, True))
+def test_quantized_samples_are_half_a_scale_off(ball, light):
+    plain, rounded = (
+        make_tiles(ball, EYE, num_tiles=5, block=16, quantized=q) for q in (False, True)
+    )
     assert rounded.samples.dtype == jnp.int8
-    steps = np.asarray(rounded.steps)[..., None]
-    difference = np.asarray(rounded.samples) * steps - np.asarray(plain.samples)
-    assert np.all(np.abs(difference) <= 0.501 * steps)
-    colors = [shade_tiles(light, ball, EYE, MATERIAL, t).color for t in (plain, rounded)]
+    scales = np.asarray(rounded.scales)[..., None]
+    difference = np.asarray(rounded.samples) * scales - np.asarray(plain.samples)
+    assert np.all(np.abs(difference) <= 0.501 * scales)
+    colors = [t(light, EYE, MATERIAL).color for t in (plain, rounded)]
     np.testing.assert_allclose(*colors, atol=4e-3 * np.abs(colors[0]).max())
 
 
 def test_frames_reuse_compiled_code(ball, light):
     eyes = [EYE, -EYE]
-    tiles = [make_tiles(ball, eye, count=8, block=16) for eye in eyes]
-    shade_tiles(light, ball, EYE, MATERIAL, tiles[0])
+    tiles = [make_tiles(ball, eye, num_tiles=8, block=16) for eye in eyes]
+    tiles[0](light, EYE, MATERIAL)
     before = _tiles._shade_tiles._cache_size()
     for eye, tile_set in zip(eyes, reversed(tiles), strict=True):
-        shade_tiles(-light, ball, eye, MATERIAL, tile_set)
+        tile_set(-light, eye, MATERIAL)
     assert _tiles._shade_tiles._cache_size() == before
 
 
 def test_tiles_differentiate_as_the_full_computation(ball, light, rng):
-    tiles = make_tiles(ball, EYE, count=5, block=16, quantized=False)
+    tiles = make_tiles(ball, EYE, num_tiles=5, block=16, quantized=False)
     weights = jnp.asarray(rng.normal(size=(COUNT, 3)))
 
     def loss(shade):
         return lambda *frame: jnp.sum(weights * shade(*frame))
 
     def by_tiles(light, material, eye):
-        return shade_tiles(light, ball, eye, material, tiles).color
+        return tiles(light, eye, material).color
 
     def in_full(light, material, eye):
         return transfer.shade_glossy(light, ball, eye, material)
@@ -230,10 +240,10 @@ def test_tiles_differentiate_as_the_full_computation(ball, light, rng):
 
 
 def test_tiles_of_a_batch_of_lights(ball, light):
-    tiles = make_tiles(ball, EYE, count=8, block=16)
+    tiles = make_tiles(ball, EYE, num_tiles=8, block=16)
 
     def color(light):
-        return shade_tiles(light, ball, EYE, MATERIAL, tiles).color
+        return tiles(light, EYE, MATERIAL).color
 
     lights = jnp.stack([light, 2 * light])
     both = jax.vmap(color)(lights)
@@ -243,8 +253,8 @@ def test_tiles_of_a_batch_of_lights(ball, light):
 
 @pytest.mark.parametrize(("count", "block"), [(7, 16), (1, 8), (1000, 7)])
 def test_tiling_holds_each_vertex(ball, count, block):
-    tiles = make_tiles(ball, EYE, count=count, block=block)
-    order, tile = np.asarray(tiles.tiling.order), np.asarray(tiles.tiling.tile)
+    tiles = make_tiles(ball, EYE, num_tiles=count, block=block)
+    order, tile = np.asarray(tiles.tiling.permutation), np.asarray(tiles.tiling.tile)
     blocks = -(-COUNT // block)
     assert order.shape == (blocks, block)
     assert len(tiles.tiling.axes) == min(count, blocks)
@@ -255,55 +265,57 @@ def test_tiling_holds_each_vertex(ball, count, block):
 
 def test_atlas_takes_the_nearest_view(ball):
     atlas = make_tile_atlas(
-        ball, distance=3.0, views=5, count=4, block=32, directions=7, exponent=9.0
+        ball, distance=3.0, views=5, num_tiles=4, block=32, directions=7, exponent=9.0
     )
     for view in (0, 3):
-        eye = atlas.centre + 2.5 * atlas.eyes[view]
+        eye = atlas.center + 2.5 * atlas.eyes[view]
         assert atlas.view(eye) == view
-    eye = atlas.centre + 3.0 * atlas.eyes[3]
-    expected = make_tiling(ball, eye, count=4, block=32)
+    eye = atlas.center + 3.0 * atlas.eyes[3]
+    expected = make_tiling(ball, eye, num_tiles=4, block=32)
     expected = arrange(ball, expected, directions=7, exponent=9.0)
     jax.tree.map(np.testing.assert_array_equal, atlas.nearest(ball, eye), expected)
 
 
 def test_follower_arrives_at_the_nearest_view(ball):
-    atlas = make_tile_atlas(ball, views=6, count=4, block=32)
+    atlas = make_tile_atlas(ball, views=6, num_tiles=4, block=32)
     follow = TileFollower(atlas, ball, atlas.eyes[0])
     for eye in atlas.eyes:
         jax.block_until_ready(follow(eye))
     for _ in range(2):  # the set under way may still be one before
         jax.block_until_ready(follow._sets)
         arrived = follow(atlas.eyes[-1])
-    np.testing.assert_array_equal(arrived.tiling.order, atlas.order[-1])
+    np.testing.assert_array_equal(arrived.tiling.permutation, atlas.permutation[-1])
     assert len(follow._sets) <= 4
 
 
 def test_follower_has_at_once_what_was_prepared_or_kept(ball):
-    atlas = make_tile_atlas(ball, views=6, count=4, block=32)
+    atlas = make_tile_atlas(ball, views=6, num_tiles=4, block=32)
     follow = TileFollower(atlas, ball, atlas.eyes[0], keep=2)
     assert follow.prepare(np.asarray(atlas.eyes)[[1, 1, 4, 5]]) == 3
     sets = [follow(atlas.eyes[view]) for view in (1, 4, 5, 1)]
     for tiles, view in zip(sets, (1, 4, 5, 1), strict=True):
-        np.testing.assert_array_equal(tiles.tiling.order, atlas.order[view])
+        np.testing.assert_array_equal(tiles.tiling.permutation, atlas.permutation[view])
     assert sets[3] is sets[0]
 
 
 def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
-    tiles = make_tiles(ball, EYE, count=4, block=32)
+    tiles = make_tiles(ball, EYE, num_tiles=4, block=32)
     per_vertex = transfer.Material(jnp.asarray(0.5), jnp.asarray(0.5), jnp.full((COUNT,), 8.0))
     with pytest.raises(ValueError, match="one exponent"):
-        shade_tiles(light, ball, EYE, per_vertex, tiles)
+        tiles(light, EYE, per_vertex)
     with pytest.raises(ValueError, match="one light"):
-        shade_tiles(light[None, None], ball, EYE, MATERIAL, tiles)
-    other = make_tiles(jax.tree.map(lambda x: x[:100] % 100, ball), EYE, count=2, block=32)
+        tiles(light[None, None], EYE, MATERIAL)
+    other = make_tiles(jax.tree.map(lambda x: x[:100] % 100, ball), EYE, num_tiles=2, block=32)
     with pytest.raises(ValueError, match="expected tiles of 300"):
-        shade_tiles(light, ball, EYE, MATERIAL, other)
+        shade(light, ball, EYE, MATERIAL, Tiles(other))
     with pytest.raises(ValueError, match="expected a tiling of 300"):
-        arrange(ball, Tiling(other.tiling.order, other.tiling.tile, other.tiling.axes))
+        arrange(ball, Tiling(other.tiling.permutation, other.tiling.tile, other.tiling.axes))
     with pytest.raises(ValueError, match="light of the tiles' degree"):
-        shade_tiles(light[:, :9], ball, EYE, MATERIAL, tiles)
+        tiles(light[:, :9], EYE, MATERIAL)
     twice = Tiling(
-        tiles.tiling.order.at[0].set(tiles.tiling.order[1]), tiles.tiling.tile, tiles.tiling.axes
+        tiles.tiling.permutation.at[0].set(tiles.tiling.permutation[1]),
+        tiles.tiling.tile,
+        tiles.tiling.axes,
     )
     with pytest.raises(ValueError, match="expected a tiling of 300 vertices, got one of 2"):
         arrange(ball, twice)
@@ -315,12 +327,28 @@ def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
         with pytest.raises(ValueError, match="directions of at least 1"):
             make_tile_atlas(ball, **wrong)
     with pytest.raises(ValueError, match="a view from 0 to 1, got 2"):
-        make_tile_atlas(ball, views=2, count=2).tiling(2)
+        make_tile_atlas(ball, views=2, num_tiles=2).tiling(2)
     with pytest.raises(ValueError, match="at least 1"):
-        make_tiles(ball, EYE, count=0)
+        make_tiles(ball, EYE, num_tiles=0)
     with pytest.raises(ValueError, match="eye"):
         make_tiles(ball, EYE[:2])
     with pytest.raises(ValueError, match="keep of at least 2"):
-        TileFollower(make_tile_atlas(ball, views=1, count=2), ball, EYE, keep=1)
+        TileFollower(make_tile_atlas(ball, views=1, num_tiles=2), ball, EYE, keep=1)
     with pytest.raises(ValueError, match="at least 1 view"):
         make_tile_atlas(ball, views=0)
+
+
+def test_a_method_makes_its_tiles_and_takes_a_diffuse_part(ball, light, unchecked):
+    frame = light, ball, EYE, MATERIAL
+    given = make_tiles(ball, EYE, num_tiles=5, block=16, exponent=8.0)
+    assert isinstance(given.diffuse, transfer.QuantizedTransfer)
+    on_the_way = shade(*frame, Tiles(num_tiles=5, block=16))
+    np.testing.assert_array_equal(on_the_way.color, given(light, EYE, MATERIAL).color)
+    assert make_tiles(ball, EYE, num_tiles=5, block=16, quantized=False).diffuse is ball
+    atlas = make_tile_atlas(ball, views=2, num_tiles=4, block=32)
+    assert atlas.nearest(ball, EYE, diffuse=ball).diffuse is ball
+    for make in (lambda ball: make_tiles(ball, EYE), lambda ball: make_tile_atlas(ball, views=1)):
+        with pytest.raises(ValueError, match="looks at the values of its arguments"):
+            jax.jit(make)(ball)
+    with pytest.raises(ValueError, match="Tiles without a tile set looks at the values"):
+        jax.jit(lambda eye: shade(light, ball, eye, MATERIAL, "tiles").color)(jnp.asarray(EYE))

@@ -205,7 +205,7 @@ def test_panels_are_evened():
         (Look, {"threshold": -0.1}, "thresholds"),
         (Figure8, {"shown": (2, 3)}, "above the base"),
         (Figure10, {"sheet": 30}, "sheet"),
-        (Figure10, {"leave": 0.0}, "leave"),
+        (Figure10, {"hysteresis": 0.0}, "hysteresis"),
         (Glossy, {"distance": 1.5}, "touch the mesh"),
         (Glossy, {"exponents": ()}, "exponents"),
         (Glossy, {"samples": 0}, "samples"),

@@ -1,0 +1,274 @@
+"""Anchors: the glossy part in full at a few vertices, carried over where it is smooth."""
+
+import functools
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float, Int
+
+from .._core.checks import align, check_degree
+from .._core.xla import materialize
+from ..transfer import (
+    AbstractTransfer,
+    Material,
+    SampledTransfer,
+    Transfer,
+    sample,
+    shade_diffuse,
+)
+from ..transfer._glossy_kernels import lobe_polynomial, lobe_products, mirrored
+from ._method import (
+    AbstractMethod,
+    check_known,
+    check_one_device,
+    check_one_exponent,
+    check_set,
+    check_whole_degree,
+    checked_frame,
+    checked_scalar,
+    plain_transfer,
+    scalars,
+)
+from ._regions import compacted, everywhere, seen_as_changed
+from ._result import AdaptiveResult, product_cost, sum_cost
+from ._staged import SampledRows, diffuse_part, row_products, sample_rows
+
+# Distance of opposite normals, in half-extents of the mesh.
+_NORMALS = 2.0
+# Anchors that a vertex looks at.
+NEAREST = 4
+SHARE, BASE, THRESHOLD = 0.1, 1, 0.06
+
+
+class AnchorSet(eqx.Module):
+    """Holds anchor vertices of a mesh, and which of them each vertex lies between.
+
+    Made by `make_anchors`; called with a frame, it shades. Independent of light and eye.
+    """
+
+    anchors: Int[Array, " p"]
+    nearest: Int[Array, "v 4"]  # numbers into `anchors`
+    weights: Float[Array, "v 4"]  # sum to one
+    rows: SampledRows
+    base: SampledTransfer
+    diffuse: AbstractTransfer
+
+    @property
+    def num_points(self) -> int:
+        return len(self.nearest)
+
+    @property
+    def degree(self) -> int:
+        return self.diffuse.degree
+
+    def __call__(
+        self,
+        light: Float[ArrayLike, "3 k"],
+        eye: Float[ArrayLike, " 3"],
+        material: Material,
+        *,
+        threshold: Float[ArrayLike, ""] = THRESHOLD,
+        exposure: Float[ArrayLike, ""] = 1.0,
+        distant: bool = False,
+        normalized: bool = True,
+    ) -> AdaptiveResult:
+        """Shade a frame in full only at the anchors and where these disagree.
+
+        All vertices take the glossy part S at the anchors' base degree. The rest, ΔS, is computed
+        at the anchors; a vertex takes the mean of its nearest four, weighed by 1/distance², where
+        they differ by less than `threshold`, and is computed in full where they do not. Not in
+        Lee & Kim 2014, whose filter decides by ΔS itself. Whether it pays against
+        `transfer.shade_glossy` of a sampled transfer hangs on how many that are; experiment
+        `leekim2014.table1` prints both.
+
+        **Arguments**
+
+        - `light`, `eye`, `material`, `distant`, `normalized`: as for `transfer.shade_glossy`; one
+          light (3, K) of the transfer's degree, and one exponent.
+        - `threshold`: of max - min over the four anchors, the largest channel, after the albedo
+          and times `exposure`. At 0 every vertex is computed in full, exactly.
+
+        **Returns** an `AdaptiveResult`; `active_fraction` has "anchors" and "specular", the shares
+        computed in full as an anchor and as a vertex. Differentiable in light and albedos where
+        the choice of vertices does not change, forward and reverse; the choice is a constant.
+
+        Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
+        """
+        light, eye, material = checked_frame(light, self.diffuse, eye, material)
+        check_whole_degree("anchors", light, self.degree)
+        check_one_exponent(material, self.num_points)
+        check_one_device("An AnchorSet", self)
+        limits = scalars(light.dtype, threshold=threshold, exposure=exposure)
+        limits = limits["threshold"], limits["exposure"]
+        return _shade_anchors(light, eye, material, self, limits, distant, normalized)
+
+
+def make_anchors(
+    transfer: Transfer,
+    *,
+    share: float = SHARE,
+    base: int = BASE,
+    quantized: bool = True,
+    diffuse: AbstractTransfer | None = None,
+) -> AnchorSet:
+    """Choose anchors, spread evenly over positions and normals, and the four nearest each vertex.
+
+    **Arguments**
+
+    - `transfer`: of at least four vertices, with known values.
+    - `share`: of the vertices that are anchors, in (0, 1].
+    - `base`: degree to which all vertices are computed.
+    - `quantized`: whether samples and the diffuse part are rounded to eight bits.
+    - `diffuse`: the diffuse part, where it is there already, in any form.
+
+    Takes three quarters of the transfer's memory for its samples, or three times that where they
+    are not rounded, and the diffuse part. Neither traceable nor differentiable; raises
+    `ValueError` for a share or a base that is out of range, and for arrays on several devices.
+
+    **Example**
+
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> anchors = adaptive.make_anchors(transfer.unshadowed(points, points, degree=2), share=0.2)
+    >>> anchors.anchors.shape, anchors.nearest.shape
+    ((10,), (50, 4))
+    """
+    from scipy.spatial import KDTree
+
+    check_one_device("make_anchors", transfer)
+    check_known("make_anchors", transfer)
+    count = transfer.num_points
+    if not 0 < share <= 1 or count < NEAREST:
+        raise ValueError(
+            f"expected a share in (0, 1] of at least {NEAREST} vertices, got {share} of {count}"
+        )
+    if check_degree(base) > transfer.degree:
+        raise ValueError(f"expected base of at most {transfer.degree}, got {base}")
+    points, normals = np.asarray(transfer.positions), np.asarray(transfer.normals)
+    extent = max(float(np.ptp(points, axis=0).max()) / 2, 1e-30)
+    features = np.concatenate([points / extent, _NORMALS / 2 * normals], axis=1)
+    anchors = _spread(features, max(round(share * count), NEAREST))
+    distance, nearest = KDTree(features[anchors]).query(features, k=NEAREST)
+    weights = 1 / (distance**2 + 1e-12)
+    dtype = transfer.coefficients.dtype
+    return AnchorSet(
+        jnp.asarray(anchors.astype(np.int32)),
+        jnp.asarray(nearest.astype(np.int32)),
+        jnp.asarray((weights / weights.sum(axis=1, keepdims=True)).astype(dtype)),
+        sample_rows(transfer.coefficients, transfer.degree, quantized),
+        sample(transfer, base),
+        diffuse_part(transfer, diffuse, quantized),
+    )
+
+
+class Anchors(AbstractMethod):
+    """Shades glossily in full at anchors, and between them where these disagree: see `AnchorSet`.
+
+    **Options**
+
+    - `anchors`: from `make_anchors`, of this transfer; serve any light and eye. Without them
+      `share`, `base` and `quantized` are `make_anchors`' arguments, and they are made anew in each
+      call.
+    - `threshold`, `exposure`, `distant`, `normalized`: as for a call of an `AnchorSet`.
+
+    **Example**
+
+    >>> from jaxsh import adaptive
+    >>> adaptive.Anchors(threshold=0.02).share
+    0.1
+    """
+
+    anchors: AnchorSet | None = None
+    share: float = eqx.field(static=True, default=SHARE)
+    base: int = eqx.field(static=True, default=BASE)
+    quantized: bool = eqx.field(static=True, default=True)
+    threshold: Float[ArrayLike, ""] = THRESHOLD
+    exposure: Float[ArrayLike, ""] = 1.0
+    distant: bool = eqx.field(static=True, default=False)
+    normalized: bool = eqx.field(static=True, default=True)
+
+    def __check_init__(self):
+        for name in ("threshold", "exposure"):
+            checked_scalar(name, getattr(self, name))
+
+    def __call__(
+        self,
+        light: Float[ArrayLike, "3 k"],
+        transfer: AbstractTransfer,
+        eye: Float[ArrayLike, " 3"],
+        material: Material,
+    ) -> AdaptiveResult:
+        anchors = self.anchors
+        if anchors is None:
+            plain = plain_transfer("anchors", transfer)
+            options = {"share": self.share, "base": self.base, "quantized": self.quantized}
+            anchors = make_anchors(plain, **options)
+        check_set("anchors", anchors.num_points, anchors.degree, transfer)
+        return anchors(
+            light,
+            eye,
+            material,
+            threshold=self.threshold,
+            exposure=self.exposure,
+            distant=self.distant,
+            normalized=self.normalized,
+        )
+
+
+@functools.partial(jax.jit, static_argnames=("distant", "normalized"))
+def _shade_anchors(light, eye, material, anchors, limits, distant, normalized):
+    threshold, exposure = limits
+    axis = mirrored(eye, anchors.base.positions, anchors.base.normals, distant)
+    polynomial = lobe_polynomial(material.exponent, anchors.degree, normalized)
+
+    def in_full(vertices):
+        return row_products(light, anchors.rows, axis, polynomial, vertices)
+
+    base_polynomial = lobe_polynomial(material.exponent, anchors.base.degree, normalized)
+    width = (anchors.base.degree + 1) ** 2
+    base = lobe_products(light[:, :width], anchors.base, axis, base_polynomial)
+    at_anchors = everywhere(lambda i: in_full(anchors.anchors[i]), len(anchors.anchors))
+    rest = at_anchors - base[:, anchors.anchors]
+    spread, carried = materialize(_between, rest, anchors.nearest, anchors.weights, base)
+    albedo = material.specular
+    specular = albedo.T if albedo.ndim == 2 else albedo.reshape(-1, 1)
+    active = materialize(seen_as_changed, spread, threshold, specular * exposure)
+    glossy = jnp.where(active[None], compacted(in_full, active), carried).T
+
+    diffuse = shade_diffuse(light, anchors.diffuse, material.diffuse)
+    color = diffuse + jnp.multiply(*align(glossy, material.specular))
+    shares = {
+        "anchors": jnp.asarray(len(anchors.anchors) / len(active), light.dtype),
+        "specular": jnp.mean(active.astype(light.dtype)),
+    }
+    target = anchors.degree
+    once = sum_cost(anchors.base.degree, target) + product_cost("diffuse", 0, target, target)
+    again = sum_cost(target, target)
+    return AdaptiveResult(color, shares, once + again * (shares["anchors"] + shares["specular"]))
+
+
+def _between(rest, nearest, weights, base):
+    """Returns how much a vertex's anchors differ, and the value that they give it."""
+    near = [rest.at[:, nearest[:, i]].get(mode="promise_in_bounds") for i in range(NEAREST)]
+    spread = functools.reduce(jnp.maximum, near) - functools.reduce(jnp.minimum, near)
+    return spread, base + sum(w[None] * n for w, n in zip(weights.T, near, strict=True))
+
+
+def _spread(features: Float[np.ndarray, "v f"], count: int) -> Int[np.ndarray, " p"]:
+    """Picks a point in each of `count` cells; the largest in turn is halved along its widest side."""
+    cells = [np.arange(len(features))]
+    while len(cells) < count:
+        halves = []
+        left = count - len(cells)
+        for i, cell in enumerate(sorted(cells, key=len, reverse=True)):
+            if i >= left or len(cell) < 2:
+                halves.append(cell)
+                continue
+            side = features[cell][:, np.ptp(features[cell], axis=0).argmax()]
+            order = np.argpartition(side, len(cell) // 2)
+            halves += [cell[order[: len(cell) // 2]], cell[order[len(cell) // 2 :]]]
+        cells = halves
+    middle = [np.sum((features[c] - features[c].mean(axis=0)) ** 2, axis=1).argmin() for c in cells]
+    return np.array([cell[i] for cell, i in zip(cells, middle, strict=True)])

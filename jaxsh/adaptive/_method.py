@@ -1,0 +1,129 @@
+"""The base of all methods: typed options, and the checks that they share."""
+
+import abc
+import dataclasses
+import difflib
+from collections.abc import Iterable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from .._core.checks import as_float, is_concrete
+from .._core.xla import on_mesh
+from ..harmonics import degree_of
+from ..transfer import AbstractTransfer, Material, Transfer
+from ..transfer._glossy_kernels import checked_eye, checked_material, checked_one_light
+from ._result import AdaptiveResult
+
+
+class AbstractMethod(eqx.Module):
+    """Shades V vertices with less work than `transfer.shade_glossy`; its fields are the options.
+
+    The methods are `Masks`, `Levels`, `TwoStage`, `Anchors` and `Tiles`. `shade` calls them.
+    """
+
+    def __new__(cls, *_, **options):
+        # Python names the unknown option; this names the one that was meant, too.
+        known = [field.name for field in dataclasses.fields(cls)]
+        for name in options:
+            if name not in known:
+                raise TypeError(f"{cls.__name__} has no option {name!r}; {suggestion(name, known)}")
+        return super().__new__(cls)
+
+    @abc.abstractmethod
+    def __call__(
+        self,
+        light: Float[ArrayLike, "3 k"],
+        transfer: AbstractTransfer,
+        eye: Float[ArrayLike, " 3"],
+        material: Material,
+    ) -> AdaptiveResult:
+        """Shade a frame."""
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Names the nearest of the known names, or all of them where none is near."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"it has {', '.join(known)}"
+
+
+def checked_frame(light, transfer: AbstractTransfer, eye, material: Material):
+    """Casts light, eye and material to the transfer's dtype; one light of degree 2 or above."""
+    count, dtype = transfer.num_points, transfer.dtype
+    light = checked_one_light(light, count, transfer.degree, dtype)
+    if degree_of(light.shape[-1]) < 2:
+        raise ValueError(f"expected a light of degree 2 or above, got {degree_of(light.shape[-1])}")
+    return light, checked_eye(eye, dtype), checked_material(material, count, dtype)
+
+
+def check_set(kind: str, num_points: int, degree: int, transfer: AbstractTransfer) -> None:
+    """Raises `ValueError` unless a set is of as many vertices and of the degree of a transfer."""
+    if num_points != transfer.num_points or degree != transfer.degree:
+        raise ValueError(
+            f"expected {kind} of {transfer.num_points} vertices and degree {transfer.degree}, got "
+            f"{num_points} and {degree}"
+        )
+
+
+def check_whole_degree(kind: str, light: Array, degree: int) -> None:
+    """Raises `ValueError` unless a light is of a set's degree."""
+    if degree_of(light.shape[-1]) != degree:
+        raise ValueError(
+            f"expected a light of the {kind}' degree, {degree}, got {degree_of(light.shape[-1])}"
+        )
+
+
+def check_one_exponent(material: Material, count: int) -> None:
+    if material.exponent.ndim:
+        raise ValueError(f"expected one exponent, got one for each of {count} vertices")
+
+
+def checked_scalar(name: str, value: ArrayLike) -> Float[Array, ""]:
+    """Returns a number; raises `ValueError` for other shapes, and where it is known not to be >= 0.
+
+    A Python number keeps no dtype of its own.
+    """
+    array = as_float(value)
+    if array.ndim:
+        raise ValueError(f"expected {name} as a number, got shape {array.shape}")
+    if is_concrete(array) and not np.asarray(array) >= 0:
+        raise ValueError(f"{name} must be >= 0, got {value}")
+    return array
+
+
+def plain_transfer(name: str, transfer: AbstractTransfer) -> Transfer:
+    """Returns the coefficients that a method needs; raises `ValueError` where they are not held."""
+    plain = transfer.glossy_form(transfer.degree)
+    if not isinstance(plain, Transfer):
+        raise ValueError(
+            f"method {name!r} needs the transfer's coefficients, got a {type(plain).__name__}"
+        )
+    return plain
+
+
+def check_one_device(name: str, *trees) -> None:
+    """Raises `ValueError` for arrays on several devices."""
+    if on_mesh(*trees):
+        raise ValueError(
+            f"{name} gathers vertices from all over the mesh, which would move them between "
+            "devices: expected arrays on one device; with several, take Masks() without rings and "
+            "smoothing, or transfer.shade_glossy"
+        )
+
+
+def check_known(name: str, *trees) -> None:
+    """Raises `ValueError` for arrays whose values are being traced."""
+    arrays = (leaf for leaf in jax.tree.leaves(trees) if isinstance(leaf, Array))
+    if not all(map(is_concrete, arrays)):
+        raise ValueError(
+            f"{name} looks at the values of its arguments and cannot be traced: call it before "
+            "jit, vmap or grad, and give them the result"
+        )
+
+
+def scalars(dtype: jnp.dtype, **values: ArrayLike) -> dict[str, Float[Array, ""]]:
+    """Casts checked numbers."""
+    return {name: checked_scalar(name, value).astype(dtype) for name, value in values.items()}

@@ -1,0 +1,156 @@
+"""Regions of interest: who stays, how a region grows and fades, and work on its vertices alone."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+# Vertices per pass: what they need stays in cache.
+BLOCK = 1024
+_ROW = 256
+
+
+# From the numbers of some vertices, or None for all of them in their order.
+Work = Callable[[Int[Array, " block"] | None], Float[Array, "rows block"]]
+
+
+def everywhere(work: Work, count: int, *, whole: bool = False) -> Float[Array, "rows v"]:
+    """Calls `work` on the numbers of all vertices, block by block, or on all at once."""
+    if whole:
+        return work(None)
+    blocks = -(-count // BLOCK)
+    numbers = jnp.minimum(jnp.arange(blocks * BLOCK, dtype=jnp.int32), count - 1)
+    done = jax.lax.map(jax.checkpoint(work), numbers.reshape(blocks, BLOCK))
+    return jnp.moveaxis(done, 0, 1).reshape(done.shape[1], -1)[:, :count]
+
+
+def compacted(work: Work, active: Bool[Array, " v"]) -> Float[Array, "rows v"]:
+    """Calls `work` on the numbers of the active vertices, block by block; zero for all others.
+
+    Their numbers are gathered by a running count, and blocks past the last one are skipped. So
+    any number of vertices takes the same program, and what is skipped costs next to nothing. A
+    loop of so many trips could not be differentiated in reverse; one that skips can.
+    """
+    count = active.shape[0]
+    blocks = -(-count // BLOCK)
+    place = _running_count(active) - 1
+    # Past the end where not active, and so dropped.
+    target = jnp.where(active, place, blocks * BLOCK)
+    numbers = jnp.zeros(blocks * BLOCK, jnp.int32)
+    numbers = numbers.at[target].set(jnp.arange(count, dtype=jnp.int32), mode="drop")
+
+    @jax.checkpoint
+    def block(part):
+        start, rows = part
+        like = jax.eval_shape(work, rows)
+        return jax.lax.cond(
+            start <= place[-1], work, lambda _: jnp.zeros(like.shape, like.dtype), rows
+        )
+
+    starts = jnp.arange(blocks, dtype=jnp.int32) * BLOCK
+    done = jax.lax.map(block, (starts, numbers.reshape(blocks, BLOCK)))
+    flat = jnp.moveaxis(done, 0, 1).reshape(done.shape[1], -1)
+    values = flat.at[:, jnp.maximum(place, 0)].get(mode="promise_in_bounds")
+    return jnp.where(active[None], values, 0.0)
+
+
+def _running_count(active: Bool[Array, " v"]) -> Int[Array, " v"]:
+    """Sums cumulatively, row by row of a square, which takes fewer steps than all in one."""
+    count = active.shape[0]
+    rows = jnp.pad(active, (0, -count % _ROW)).reshape(-1, _ROW)
+    along = jnp.cumsum(rows, axis=1, dtype=jnp.int32)
+    before = jnp.cumsum(along[:, -1]) - along[:, -1]
+    return (along + before[:, None]).reshape(-1)[:count]
+
+
+class Region(NamedTuple):
+    """Holds one kind of lighting on its way through the levels, for V vertices."""
+
+    added: Float[Array, "3 v"]  # to the base, and shown
+    degree: Int[Array, " v"]  # that is shown
+    active: Bool[Array, " v"]  # still inside
+    fractions: Float[Array, " levels"]  # of vertices inside after each level
+
+    @staticmethod
+    def start(base: int, count: int, dtype) -> "Region":
+        """Start with everyone inside."""
+        return Region(
+            added=jnp.zeros((3, count), dtype),
+            degree=jnp.full(count, base, jnp.int32),
+            active=jnp.ones(count, bool),
+            fractions=jnp.zeros(0, dtype),
+        )
+
+
+def decide(
+    region: Region,
+    level: int,
+    change: Float[Array, "3 v"],
+    threshold: Float[Array, " v"],
+    albedo: Float[Array, "3 v"],
+    fallback: str,
+) -> Region:
+    """Keeps those whose accumulated change, as it is seen, reaches the threshold.
+
+    Lee & Kim 2014, algorithm 1.
+    """
+    change = region.added + jnp.where(region.active[None], change, 0.0)
+    stays = region.active & seen_as_changed(change, threshold, albedo)
+    shown = region.active if fallback == "level" else stays
+    return Region(
+        added=jnp.where(shown[None], change, region.added),
+        degree=jnp.where(shown, jnp.asarray(level, jnp.int32), region.degree),
+        active=stays,
+        fractions=jnp.append(region.fractions, jnp.mean(stays, dtype=change.dtype)),
+    )
+
+
+def seen_as_changed(change, threshold, albedo) -> Bool[Array, " v"]:
+    """Compares the largest change over the channels, times albedo, with the threshold."""
+    red, green, blue = jnp.abs(change * albedo)
+    return jnp.maximum(jnp.maximum(red, green), blue) >= threshold
+
+
+def grow(
+    region: Bool[Array, " v"],
+    neighbors: Int[Array, "v n"],
+    joins: Callable[[Bool[Array, " v"]], Bool[Array, " v"]],
+    rings: int,
+) -> Bool[Array, " v"]:
+    """Searches breadth-first outwards from a region, for at most so many rings (§4.4).
+
+    Each ring is what borders on the region and was not looked at before; `joins` says which of it
+    joins. The search ends early where nothing does.
+    """
+
+    def ring(carry):
+        count, region, seen, _ = carry
+        fringe = jnp.any(region[neighbors], axis=1) & ~seen
+        joined = joins(fringe) & fringe
+        return count + 1, region | joined, seen | fringe, jnp.any(joined)
+
+    def more(carry):
+        return carry[-1] & (carry[0] < rings)
+
+    start = jnp.asarray(0, jnp.int32), region, region, jnp.any(region)
+    return jax.lax.while_loop(more, ring, start)[1]
+
+
+def smooth(
+    added: Float[Array, "3 v"], region: Bool[Array, " v"], neighbors: Int[Array, "v n"]
+) -> Float[Array, "3 v"]:
+    """Fades out what a region adds to the base, over two rings around it (figure 7).
+
+    In breadth-first order each vertex of a ring takes the mean over all its neighbours, so that
+    the second ring sees the first one's new values.
+    """
+    real = neighbors != jnp.arange(len(neighbors), dtype=neighbors.dtype)[:, None]
+    valence = jnp.maximum(jnp.sum(real, axis=1), 1).astype(added.dtype)[None]
+    for _ in range(2):
+        ring = jnp.any(region[neighbors], axis=1) & ~region
+        mean = jnp.sum(jnp.where(real[None], added[:, neighbors], 0.0), axis=-1) / valence
+        added = jnp.where(ring[None], mean, added)
+        region = region | ring
+    return added

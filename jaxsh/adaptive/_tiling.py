@@ -1,0 +1,117 @@
+"""Tilings: vertices that mirror the eye into nearly the same direction share a tile."""
+
+import heapq
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float, Int
+
+from ..transfer import Transfer
+from ..transfer._glossy_kernels import checked_eye, reflected, unit
+from ._method import check_known, check_one_device
+
+# Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
+BLOCK = 128
+NUM_TILES = 128
+
+
+class Tiling(eqx.Module):
+    """Groups vertices in blocks and blocks in tiles, by indices alone. Made by `make_tiling`.
+
+    `permutation` names the vertex at each place, the last vertex again where a block must be
+    filled up; `tile` is the tile of each block, ascending. `axes` are where a tile's vertices
+    mirror the eye, on average.
+    """
+
+    permutation: Int[Array, "blocks b"]
+    tile: Int[Array, " blocks"]
+    axes: Float[Array, "tiles 3"]
+
+
+def make_tiling(
+    transfer: Transfer,
+    eye: Float[ArrayLike, " 3"],
+    *,
+    distant: bool = False,
+    num_tiles: int = NUM_TILES,
+    block: int = BLOCK,
+    areas: Float[ArrayLike, " v"] | None = None,
+) -> Tiling:
+    """Split all vertices again and again, the costliest tile first, into `num_tiles` tiles.
+
+    A tile costs Σ area·(max(n·ω_o, 0) + 0.05)·|B - B̄|⁶, and is split at the middle of its extent
+    along its longest axis. Where there are fewer blocks than `num_tiles`, each is a tile.
+    Arguments and errors as for `make_tiles`; `areas` of the vertices, relative to their mean,
+    where they are known already.
+
+    **Example**
+
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> adaptive.make_tiling(made, [0.0, -3.0, 0.0], num_tiles=3, block=8).permutation.shape
+    (7, 8)
+    """
+    if num_tiles < 1 or block < 1:
+        raise ValueError(f"expected num_tiles and block of at least 1, got {num_tiles} and {block}")
+    check_one_device("make_tiling", transfer)
+    check_known("make_tiling", transfer, eye)
+    eye = checked_eye(eye, transfer.positions.dtype)
+    axis = np.asarray(reflected(eye, transfer.positions, transfer.normals, distant), np.float32)
+    facing = np.sum(np.asarray(unit(transfer.normals.T)) * axis, axis=0)
+    areas = vertex_areas(transfer) if areas is None else np.asarray(areas)
+    weights = areas * (np.maximum(facing, 0) + 0.05)
+    blocks, last = -(-len(weights) // block), len(weights) - 1
+    # What fills the last block up weighs nothing.
+    spare = blocks * block - len(weights)
+    weights, axis = np.pad(weights, (0, spare)), np.pad(axis, ((0, 0), (0, spare)), mode="edge")
+    tiles = _split(axis.T, weights, np.arange(len(weights)), min(num_tiles, blocks), block)
+    sizes = [len(tile) // block for tile in tiles]
+    axes = [_towards(weights[tile] @ axis.T[tile]) for tile in tiles]
+    return Tiling(
+        jnp.asarray(np.minimum(np.concatenate(tiles), last).reshape(-1, block).astype(np.int32)),
+        jnp.asarray(np.repeat(np.arange(len(tiles), dtype=np.int32), sizes)),
+        jnp.asarray(np.stack(axes), transfer.positions.dtype),
+    )
+
+
+def _towards(vector: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
+    """Scales to unit length; +z where there is no direction."""
+    length = np.linalg.norm(vector)
+    return vector / length if length > 0 else np.array([0.0, 0.0, 1.0])
+
+
+def _split(axis, weights, vertices, count, block) -> list[np.ndarray]:
+    serial, queue = 0, []
+
+    def push(members):
+        nonlocal serial
+        serial += 1
+        weight, offsets = weights[members], axis[members]
+        offsets = offsets - weight @ offsets / weight.sum()
+        cost = weight @ np.sum(offsets * offsets, axis=1) ** 3
+        # A single block stays whole: it waits behind all that can be split.
+        heapq.heappush(queue, (-cost if len(members) > block else 1.0, serial, members, offsets))
+
+    push(vertices)
+    while len(queue) < count:
+        *_, members, offsets = heapq.heappop(queue)
+        _, vectors = np.linalg.eigh(offsets.T @ (weights[members, None] * offsets))
+        along = offsets @ vectors[:, -1]
+        middle = np.count_nonzero(along < (along.min() + along.max()) / 2)
+        cut = block * int(np.clip(round(middle / block), 1, len(members) // block - 1))
+        parts = np.argpartition(along, cut)
+        push(members[parts[:cut]])
+        push(members[parts[cut:]])
+    return [members for *_, members, _ in queue]
+
+
+def vertex_areas(transfer: Transfer) -> Float[np.ndarray, " v"]:
+    """Estimates areas by the mean squared length of a vertex's edges, relative to all vertices'."""
+    points, neighbors = np.asarray(transfer.positions), np.asarray(transfer.neighbors)
+    real = neighbors != np.arange(len(points))[:, None]
+    squares = np.sum((points[neighbors] - points[:, None]) ** 2, axis=(1, 2))
+    areas = squares / np.maximum(real.sum(axis=1), 1)
+    mean = areas.mean()
+    return np.maximum(areas / mean, 1e-3) if mean > 0 else np.ones_like(areas)
