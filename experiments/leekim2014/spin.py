@@ -52,7 +52,7 @@ def spun(scene: Scene, angle: float) -> Scene:
 
 
 def methods(
-    scene: Scene, *, thresholds: dict[str, float], hysteresis: float, views: int
+    scene: Scene, *, thresholds: dict[str, Any], hysteresis: float, views: int
 ) -> Iterator[Method]:
     """All but masks, which give the colours of levels."""
     staged = adaptive.stage(scene.baked)

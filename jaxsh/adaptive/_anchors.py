@@ -257,7 +257,7 @@ def _between(rest, nearest, weights, base):
 
 
 def _spread(features: Float[np.ndarray, "v f"], count: int) -> Int[np.ndarray, " p"]:
-    """Picks a point in each of `count` cells; the largest in turn is halved along its widest side."""
+    """Picks a point in each of `count` cells, made by halving the largest along its widest side."""
     cells = [np.arange(len(features))]
     while len(cells) < count:
         halves = []

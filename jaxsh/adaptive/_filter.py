@@ -89,7 +89,7 @@ def filtered(
 ) -> AdaptiveResult:
     """Runs algorithm 1 for the diffuse and the specular part, refined and smoothed."""
     products = _products(light, transfer, eye, material.exponent, options)
-    color, cost = 0.0, 0.0
+    color, cost = jnp.zeros((3, transfer.num_points), light.dtype), 0.0
     fractions, degrees = {}, {}
     for kind, albedo in albedos(material, transfer.num_points).items():
         shown, region, work = _one(kind, albedo, products, transfer, options, previous, compact)

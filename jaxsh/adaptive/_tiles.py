@@ -201,13 +201,26 @@ def arrange(
     rule = local_rule(transfer.degree, directions, float(exponent))
     rule = tuple(jnp.asarray(part, dtype) for part in rule)
     diffuse = diffuse_part(transfer, diffuse, quantized)
-    arranged = _arrange(transfer, tiling, jnp.asarray(place), rule, quantized)
-    return TileSet(tiling, *arranged, diffuse)
+    samples, scales, at, basis, positions, normals = _arrange(
+        transfer, tiling, rule[0], rule[1], quantized
+    )
+    return TileSet(
+        tiling,
+        place=jnp.asarray(place),
+        samples=samples,
+        scales=scales,
+        directions=at,
+        basis=basis,
+        powers=rule[2],
+        lowest=rule[3],
+        positions=positions,
+        normals=normals,
+        diffuse=diffuse,
+    )
 
 
 @functools.partial(jax.jit, static_argnames="quantized")
-def _arrange(transfer, tiling, place, rule, quantized):
-    directions, rows, powers, lowest = rule
+def _arrange(transfer, tiling, directions, rows, quantized):
     turns = _turns(tiling.axes)
     directions = matmul(directions[None], jnp.swapaxes(turns, 1, 2))
     rows = rotate(rows, turns[:, None])
@@ -222,7 +235,7 @@ def _arrange(transfer, tiling, place, rule, quantized):
     basis = evaluate(directions, transfer.degree, axis=0)
     order = tiling.permutation.reshape(-1)
     positions, normals = rows_of(transfer.positions[order], transfer.normals[order])
-    return place, samples, scales, directions, basis, powers, lowest, positions, normals
+    return samples, scales, directions, basis, positions, normals
 
 
 def _turns(axes: Float[Array, "tiles 3"]) -> Float[Array, "tiles 3 3"]:
