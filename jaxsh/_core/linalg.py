@@ -23,6 +23,11 @@ def einsum(subscripts: str, *operands: ArrayLike) -> Array:
     return jnp.einsum(subscripts, *operands, precision=PRECISION)
 
 
+def tensordot(a: ArrayLike, b: ArrayLike) -> Array:
+    """Sums over the last axis of `a` and the first one of `b`."""
+    return jnp.tensordot(a, b, 1, precision=PRECISION)
+
+
 def tall_product(tall: Float[Array, "v k"], rows: Float[Array, "n k"]) -> Float[Array, "v n"]:
     """tall @ rowsᵀ, with rows of zeros up to eight: XLA's CPU kernel is faster with eight."""
     filled = jnp.pad(rows, ((0, max(0, 8 - len(rows))), (0, 0)))

@@ -46,6 +46,17 @@ class AnchorSet(eqx.Module):
     """Holds anchor vertices of a mesh, and which of them each vertex lies between.
 
     Made by `make_anchors`; called with a frame, it shades. Independent of light and eye.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> anchors = adaptive.make_anchors(made, share=0.2)
+    >>> eye, mirror = jnp.asarray([0.0, -3.0, 0.0]), transfer.Material(0.5, 0.5, 8.0)
+    >>> anchors(jnp.ones((3, 9)), eye, mirror).color.shape
+    (50, 3)
     """
 
     anchors: Int[Array, " p"]

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from .._core.linalg import PRECISION, tall_product
+from .._core.linalg import tall_product, tensordot
 from .._core.xla import on_mesh
 from ..harmonics import convolve, degree_of, evaluate, num_coefficients, phong, product_matrix
 from ..transfer import Material, Transfer
@@ -188,7 +188,7 @@ def base_product(
     count: int,
 ) -> Float[Array, "3 n"]:
     """Computes S = Σ_ij α_i y_i(B) L̂_ij O_j over the first `count` harmonics."""
-    rows = _rows(matrix[:, :count, :count], transfer[:count])
+    rows = tensordot(matrix[:, :count, :count], transfer[:count])
     return jnp.sum(rows * kernel[None, :count], axis=1)
 
 
@@ -206,9 +206,6 @@ def increment(
     part is to be added.
     """
     block = matrix[:, old:new]
-    by_row = _rows(block[..., :new], transfer[:new]) * kernel[None, old:new]
-    by_column = _rows(block[..., :old], kernel[:old]) * transfer[None, old:new]
+    by_row = tensordot(block[..., :new], transfer[:new]) * kernel[None, old:new]
+    by_column = tensordot(block[..., :old], kernel[:old]) * transfer[None, old:new]
     return jnp.sum(by_row + by_column, axis=1)
-
-
-_rows = functools.partial(jnp.tensordot, axes=1, precision=PRECISION)

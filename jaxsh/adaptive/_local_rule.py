@@ -1,4 +1,4 @@
-"""Few directions around a glossy lobe, and what of the transfer to take in each."""
+"""Rules of few directions around a glossy lobe, with weights for the transfer in each."""
 
 from typing import NamedTuple
 
@@ -106,7 +106,7 @@ def check_rule(count: int, exponent: float) -> None:
 
 
 def _covariance(left, right, degree: int, exponent: float) -> Float[np.ndarray, "m n"]:
-    """Of light times lobe, between directions."""
+    """Computes the covariance of light times lobe between directions."""
     bands = np.arange(degree + 1)
     lights = (2 * bands + 1) / (4 * np.pi) * (1.0 + bands) ** (-2.0 * _LIGHT)
     lobes = np.asarray(phong(exponent, degree), np.float64) * np.sqrt((2 * bands + 1) / (4 * np.pi))
@@ -126,7 +126,7 @@ def _poles(count: int = 64) -> Float[np.ndarray, "b 3"]:
 
 
 def _choose(covariance, cross, importance, count: int) -> list[int]:
-    """Of candidates those that lower Σ importance · error most, given the others."""
+    """Picks the candidates that lower Σ importance · error most, given the others."""
     chosen: list[int] = []
     for step in range(count * (1 + _SWEEPS)):
         if step >= count:
@@ -141,6 +141,6 @@ def _choose(covariance, cross, importance, count: int) -> list[int]:
 
 
 def _estimate(covariance, chosen: list[int], cross) -> Float[np.ndarray, "n k"]:
-    """Of what has the covariances `cross` with all, the weights of the values at those chosen."""
+    """Returns the weights of the chosen values in an estimate with covariances `cross`."""
     inner = covariance[np.ix_(chosen, chosen)] + _RIDGE * np.eye(len(chosen))
     return np.linalg.solve(inner, cross[chosen])

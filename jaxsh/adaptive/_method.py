@@ -23,6 +23,12 @@ class AbstractMethod(eqx.Module):
     """Shades V vertices with less work than `transfer.shade_glossy`; its fields are the options.
 
     The methods are `Masks`, `Levels`, `TwoStage`, `Anchors` and `Tiles`. `shade` calls them.
+
+    **Example**
+
+    >>> from jaxsh import adaptive
+    >>> isinstance(adaptive.Levels(base=1), adaptive.AbstractMethod)
+    True
     """
 
     def __new__(cls, *_, **options):

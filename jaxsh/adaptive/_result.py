@@ -18,6 +18,17 @@ class AdaptiveResult(eqx.Module):
       directions.
     - `shown_degree`: by name as in `active_fraction`, the degree that each vertex was computed to;
       empty where a method has no degrees. Given back as `previous`, the next frame remembers it.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> frame = jnp.ones((3, 9)), made, jnp.asarray([0.0, -3.0, 0.0]), transfer.Material(1, 0, 8)
+    >>> result = adaptive.shade(*frame, adaptive.TwoStage(base=1, threshold=0.0))
+    >>> result.color.shape, float(result.active_fraction["specular"])
+    ((50, 3), 1.0)
     """
 
     color: Float[Array, "v 3"]

@@ -34,6 +34,14 @@ class StagedTransfer(AbstractTransfer):
 
     All vertices at two low degrees, and vertex by vertex the values of the whole transfer at
     nodes: the form in which any vertices, wherever they are, are recomputed in full fast.
+
+    **Example**
+
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> adaptive.stage(made, middle=2, base=1).degrees
+    (1, 2, 2)
     """
 
     transfer: Transfer

@@ -20,6 +20,15 @@ class TileAtlas(eqx.Module):
 
     It holds indices and each tile's axis, 4 bytes a vertex and view; the transfer is put in a
     view's order, and sampled, when needed.
+
+    **Example**
+
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> atlas = adaptive.make_tile_atlas(made, views=3, num_tiles=2, block=16)
+    >>> atlas.view(atlas.eyes[2]), atlas.permutation.shape
+    (2, (3, 4, 16))
     """
 
     permutation: Int[Array, "views blocks b"]
@@ -121,6 +130,18 @@ class TileFollower:
     share the machine with that and are slower, and starting it takes a moment of its own. The
     `keep` sets last used are kept, for an eye that comes back; where the eye will go is known,
     `prepare` spares the frames all of it.
+
+    **Example**
+
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> atlas = adaptive.make_tile_atlas(made, views=3, num_tiles=2, block=16)
+    >>> follow = adaptive.TileFollower(atlas, made, atlas.eyes[0])
+    >>> follow.prepare(atlas.eyes)
+    3
+    >>> follow(atlas.eyes[1]).num_points
+    50
     """
 
     def __init__(

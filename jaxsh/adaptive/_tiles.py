@@ -45,6 +45,17 @@ class TileSet(eqx.Module):
     Made by `make_tiles`, `arrange` or a `TileAtlas`; called with a frame, it shades. It serves any
     eye, and best the one it was made for. Sets of one mesh, number of tiles and block have the
     same shapes, so that code compiled for one serves all.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> eye, mirror = jnp.asarray([0.0, -3.0, 0.0]), transfer.Material(0.5, 0.5, 32.0)
+    >>> tiles = adaptive.make_tiles(made, eye, num_tiles=3, block=8)
+    >>> tiles(jnp.ones((3, 9)), eye, mirror).color.shape
+    (50, 3)
     """
 
     tiling: Tiling
@@ -184,7 +195,7 @@ def arrange(
     >>> from jaxsh import adaptive, sphere, transfer
     >>> points = sphere.fibonacci(50).directions
     >>> made = transfer.unshadowed(points, points, degree=2)
-    >>> tiling = adaptive.make_tiling(made, [0.0, -3.0, 0.0], num_tiles=3, block=8)
+    >>> tiling = adaptive.make_tiling(made, points[0], num_tiles=3, block=8)
     >>> adaptive.arrange(made, tiling, directions=9).samples.shape
     (7, 9, 8)
     """

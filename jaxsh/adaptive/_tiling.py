@@ -22,6 +22,15 @@ class Tiling(eqx.Module):
     `permutation` names the vertex at each place, the last vertex again where a block must be
     filled up; `tile` is the tile of each block, ascending. `axes` are where a tile's vertices
     mirror the eye, on average.
+
+    **Example**
+
+    >>> from jaxsh import adaptive, sphere, transfer
+    >>> points = sphere.fibonacci(50).directions
+    >>> made = transfer.unshadowed(points, points, degree=2)
+    >>> tiling = adaptive.make_tiling(made, points[0], num_tiles=3, block=8)
+    >>> tiling.permutation.shape, tiling.axes.shape
+    ((7, 8), (3, 3))
     """
 
     permutation: Int[Array, "blocks b"]
@@ -50,7 +59,7 @@ def make_tiling(
     >>> from jaxsh import adaptive, sphere, transfer
     >>> points = sphere.fibonacci(50).directions
     >>> made = transfer.unshadowed(points, points, degree=2)
-    >>> adaptive.make_tiling(made, [0.0, -3.0, 0.0], num_tiles=3, block=8).permutation.shape
+    >>> adaptive.make_tiling(made, points[0], num_tiles=3, block=8).permutation.shape
     (7, 8)
     """
     if num_tiles < 1 or block < 1:

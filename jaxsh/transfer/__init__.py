@@ -1,4 +1,4 @@
-"""What reaches a surface of the light around it: transfer, baked once per mesh, and its shading.
+"""Transfer of light to a surface, visibility and cosine, baked once per mesh, and its shading.
 
 `bake` casts the rays and projects what each vertex sees, `unshadowed` needs none; the shading that
 follows is a product of coefficients, for any light, and differentiates.

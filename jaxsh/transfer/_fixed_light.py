@@ -25,6 +25,15 @@ class FixedLight(eqx.Module):
 
     `radiance` is light times transfer, R = L̂ O of Lee & Kim 2014, equation 2, in tiles of
     vertices, the last one filled up with zeros.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> still = transfer.fixed_light(jnp.ones((3, 4)), transfer.unshadowed(up, up, degree=1))
+    >>> still.degree, still(up[0], transfer.Material(0.5, 0.5, 8.0), distant=True).shape
+    (1, (1, 3))
     """
 
     radiance: Float[Array, "tiles 3 k tile"]

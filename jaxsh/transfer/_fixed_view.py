@@ -21,6 +21,16 @@ class FixedView(eqx.Module):
 
     `coefficients` are (V, K), or (V, 3, K) where an albedo differs between the channels. Their
     product with those of a light is radiance.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> made, mirror = transfer.unshadowed(up, up, degree=1), transfer.Material(0.5, 0.5, 8.0)
+    >>> view = transfer.fixed_view(made, jnp.asarray([0.0, 0.0, 5.0]), mirror)
+    >>> view.degree, view(jnp.ones((2, 3, 4))).shape  # a batch of two lights
+    (1, (2, 1, 3))
     """
 
     coefficients: Float[Array, "v k"] | Float[Array, "v 3 k"]

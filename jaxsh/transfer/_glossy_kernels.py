@@ -13,7 +13,7 @@ from jaxtyping import Array, Float, Int8, Num
 from numpy.polynomial import Polynomial
 
 from .._core.host import read_only_cache
-from .._core.linalg import PRECISION, matmul
+from .._core.linalg import matmul, tensordot
 from .._core.vectors import normalize
 from .._core.xla import materialize, on_mesh
 from ..harmonics import degree_of, legendre, orders, phong
@@ -110,7 +110,7 @@ def lobe_polynomial(
     of [0, 1] they stay small, where powers of t alone would cancel each other.
     """
     zonal = jnp.moveaxis(phong(exponent, degree, normalized=normalized), -1, 0)
-    return jnp.tensordot(jnp.asarray(_powers(degree), zonal.dtype), zonal, 1, precision=PRECISION)
+    return tensordot(jnp.asarray(_powers(degree), zonal.dtype), zonal)
 
 
 def lobe(t: Float[Array, "..."], polynomial: Float[Array, "bands ..."]) -> Float[Array, "..."]:

@@ -26,8 +26,10 @@ class Material(eqx.Module):
 
     **Example**
 
+    >>> import jax.numpy as jnp
     >>> from jaxsh.transfer import Material
-    >>> plastic = Material(diffuse=(0.5, 0.1, 0.1), specular=0.04, exponent=32.0)
+    >>> red = jnp.asarray([0.5, 0.1, 0.1])
+    >>> plastic = Material(diffuse=red, specular=0.04, exponent=32.0)
     >>> plastic.diffuse.shape, plastic.exponent.shape
     ((3,), ())
     """

@@ -190,8 +190,8 @@ def reflected_direction(
 
     >>> import jax.numpy as jnp
     >>> from jaxsh import transfer
-    >>> at, up = jnp.zeros((1, 3)), jnp.asarray([[0.0, 0.0, 1.0]])
-    >>> [round(float(x), 2) for x in transfer.reflected_direction([3.0, 0.0, 4.0], at, up)[0]]
+    >>> eye, up = jnp.asarray([3.0, 0.0, 4.0]), jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> [round(float(x), 2) for x in transfer.reflected_direction(eye, 0 * up, up)[0]]
     [-0.6, 0.0, 0.8]
     """
     positions, normals = as_float(positions), as_float(normals)

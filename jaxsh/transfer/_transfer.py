@@ -31,6 +31,18 @@ class AbstractTransfer(eqx.Module):
 
     The forms are `Transfer`, `SampledTransfer`, `QuantizedTransfer` and
     `adaptive.StagedTransfer`; `shade_diffuse` takes each of them.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> made = transfer.unshadowed(up, up, degree=1)
+    >>> forms = made, transfer.sample(made), transfer.quantize(made)
+    >>> [(form.num_points, form.degree) for form in forms]
+    [(1, 1), (1, 1), (1, 1)]
+    >>> made.irradiances(jnp.ones((2, 4))).shape
+    (1, 2)
     """
 
     @property
@@ -148,6 +160,14 @@ class SampledTransfer(AbstractTransfer):
     that nothing is lost. `samples` are in the passes in which shading goes through them. At degree
     10 there are 350 directions; with the coefficients beside them, that is four times the memory
     of the transfer.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> transfer.sample(transfer.unshadowed(up, up, degree=10)).samples.shape
+    (10, 35, 1)
     """
 
     samples: Float[Array, "passes n v"]
@@ -199,6 +219,15 @@ class QuantizedTransfer(AbstractTransfer):
 
     Made once by `quantize`, for `shade_diffuse` with lights that all points share, which reads
     each coefficient once a frame and waits for memory.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import transfer
+    >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+    >>> made = transfer.quantize(transfer.unshadowed(up, up, degree=1))
+    >>> transfer.shade_diffuse(jnp.ones((3, 4)), made, 0.5).shape
+    (1, 3)
     """
 
     codes: Int8[Array, "blocks k b"]  # points in their order
