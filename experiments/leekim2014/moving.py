@@ -62,9 +62,9 @@ def moving(context: Context, scene: Scene, frames: int, views: int, step: float)
     mid = {name: statistics.median(times) for name, times in taken.items()}
     mean = {name: statistics.mean(times) for name, times in taken.items()}
     row = scene.row._asdict() | {f"moving_{name}_ms": 1e3 * mid[name] for name in ways}
-    made = prepared(path[0])
-    parts = (getattr(made, field.name) for field in dataclasses.fields(made))
-    own = [part for part in parts if part is not made.diffuse]  # which all sets share
+    first = prepared(path[0])
+    parts = (getattr(first, field.name) for field in dataclasses.fields(first))
+    own = [part for part in parts if part is not first.diffuse]  # which all sets share
     size = sum(leaf.nbytes for leaf in jax.tree.leaves(own))
     return row | {
         "moving_gain": mid["full"] / mid["prepared"],
