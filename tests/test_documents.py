@@ -53,7 +53,9 @@ def test_blocks_run_in_order(page, tmp_path):
 def test_notebook(path):
     notebook = nbformat.read(path, as_version=4)
     # Raises with the cell and its error where one fails.
-    nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": ROOT}}).execute()
+    client = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": ROOT}})
+    # Without the tests' backend, so that the kernel shows its figures.
+    client.execute(env={name: value for name, value in os.environ.items() if name != "MPLBACKEND"})
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
     assert any("image/png" in output.get("data", {}) for output in outputs)
     warned = [output["text"] for output in outputs if output.get("name") == "stderr"]

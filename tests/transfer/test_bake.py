@@ -121,12 +121,12 @@ def test_a_point_in_a_groove(opening):
 
 
 def test_turning_mesh_and_light_together_changes_nothing(rng):
-    mesh = knot(1500)
+    mesh = knot(700)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)
     turned = make_mesh(np.asarray(mesh.vertices) @ turn.T, mesh.faces)
-    expected = rotate(jnp.asarray(baked(mesh), float), jnp.asarray(turn))
-    assert relative(baked(turned), np.asarray(expected)) < 0.02
+    expected = rotate(jnp.asarray(baked(mesh, directions=1024), float), jnp.asarray(turn))
+    assert relative(baked(turned, directions=1024), np.asarray(expected)) < 0.015  # 1.1e-2 measured
 
 
 def test_a_seed_turns_the_directions():
