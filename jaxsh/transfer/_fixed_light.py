@@ -93,7 +93,8 @@ def _fixed_light(light, transfer):
     rows = jnp.concatenate([product_matrix(light).reshape(3 * width, width), light])
     coefficients = transfer.vectors(width)
     # On a mesh of devices a single tile, whose vertices stay sharded as they are.
-    size = max(transfer.num_points, 1) if on_mesh(coefficients) else _TILE
+    count = max(transfer.num_points, 1)
+    size = count if on_mesh(coefficients) else min(count, _TILE)
     padding = ((0, -transfer.num_points % size), (0, 0))
     tiles = jnp.pad(coefficients, padding).reshape(-1, size, width)
 
@@ -137,8 +138,9 @@ def _shade(still, eye, material, distant, normalized):
 def _in_tiles(vertices: Float[Array, "rows v"], size: int) -> Float[Array, "tiles rows tile"]:
     """Cuts the last axis into tiles, the last tile filled up with the last vertex."""
     rows, count = vertices.shape
-    padded = jnp.pad(vertices, ((0, 0), (0, -count % size)), mode="edge")
-    return jnp.moveaxis(padded.reshape(rows, -1, size), 1, 0)
+    if count % size:
+        vertices = jnp.pad(vertices, ((0, 0), (0, -count % size)), mode="edge")
+    return jnp.moveaxis(vertices.reshape(rows, -1, size), 1, 0)
 
 
 def _out_of_tiles(tiles: Float[Array, "tiles rows tile"], count: int) -> Float[Array, "rows v"]:

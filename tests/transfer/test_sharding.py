@@ -1,0 +1,192 @@
+"""Shading on a mesh of devices, sharded over the vertices."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from sharding import ROWS, WHOLE, P, check_sharded
+
+from jaxsh.transfer import (
+    Material,
+    QuantizedTransfer,
+    Transfer,
+    fixed_light,
+    fixed_view,
+    quantize,
+    reflected_direction,
+    sample,
+    shade_diffuse,
+    shade_glossy,
+    unshadowed,
+)
+
+V, DEGREE, K = 16, 1, 4
+COLUMNS, LAST = P(None, "rows"), P(None, None, "rows")
+SAMPLED = LAST, ROWS, COLUMNS, COLUMNS
+QUANTIZED = LAST, WHOLE
+STILL = P(None, None, None, "rows"), ROWS, COLUMNS, COLUMNS
+EYE = np.array([0.3, -2.0, 1.5], np.float32)
+
+
+def specs_of(prepared, specs):
+    """Specs in the place of a prepared object's arrays."""
+    return jax.tree.unflatten(jax.tree.structure(prepared), specs)
+
+
+@pytest.fixture
+def frame(rng):
+    """Light, transfer, eye and a material with all its arrays per vertex, in float32."""
+
+    def array(*shape):
+        return jnp.asarray(rng.uniform(0.1, 1, size=shape), np.float32)
+
+    normals = jnp.asarray(rng.normal(size=(V, 3)), np.float32)
+    made = Transfer(
+        array(V, K),
+        jnp.asarray(rng.normal(size=(V, 3)), np.float32),
+        normals,
+        jnp.zeros((V, 1), np.int32),
+    )
+    material = Material(array(V, 3), array(V, 1), 10 * array(V))
+    return array(3, K), made, jnp.asarray(EYE), material
+
+
+def test_diffuse_shading(frame, rng):
+    light, made, _, material = frame
+    own = jnp.asarray(rng.normal(size=(V, 3, K)), np.float32)
+    for lights, spec in ((light, WHOLE), (own, ROWS)):
+        arguments = lights, made, material.diffuse
+        check_sharded(shade_diffuse, arguments, (spec, ROWS, ROWS), ROWS)
+    batch = jnp.stack([light, 2 * light])[:, None]
+    check_sharded(shade_diffuse, (batch, made, material.diffuse), (WHOLE, ROWS, ROWS), COLUMNS)
+    check_sharded(
+        shade_diffuse,
+        (light, sample(made), material.diffuse),
+        (WHOLE, specs_of(sample(made), SAMPLED), ROWS),
+        ROWS,
+    )
+
+
+def test_its_gradient(frame):
+    def loss(coefficients, light, albedo, rest):
+        made = Transfer(coefficients, *rest)
+        return jnp.sum(shade_diffuse(light, made, albedo) ** 2)
+
+    light, made, _, material = frame
+    rest = made.positions, made.normals, made.neighbors
+    slope = lambda *arguments: jax.grad(loss)(*arguments)  # noqa: E731
+    arguments = made.coefficients, light, material.diffuse, rest
+    check_sharded(slope, arguments, (ROWS, WHOLE, ROWS, ROWS), ROWS)
+
+
+def test_eight_bits(frame, rng):
+    light, made, _, material = frame
+    # Both halves have the same largest coefficients, so that inside shard_map scales are the same.
+    half = rng.uniform(-1, 1, size=(V // 2, K))
+    twice = jnp.asarray(np.concatenate([half, -half]), np.float32)
+    made = Transfer(twice, made.positions, made.normals, made.neighbors)
+
+    def both(light, made, albedo):
+        return shade_diffuse(light, quantize(made), albedo)
+
+    check_sharded(both, (light, made, material.diffuse), (WHOLE, ROWS, ROWS), ROWS)
+    blocks = quantize(made)
+    codes = jnp.moveaxis(blocks.codes[..., :V], 0, 1).reshape(1, K, V)  # a single block of V
+    single = QuantizedTransfer(codes, blocks.scales, 0)
+    check_sharded(
+        shade_diffuse,
+        (light, single, material.diffuse),
+        (WHOLE, specs_of(single, QUANTIZED), ROWS),
+        ROWS,
+    )
+
+
+def test_glossy_shading(frame, rng):
+    light, made, eye, material = frame
+    specs = WHOLE, ROWS, WHOLE, ROWS
+    check_sharded(shade_glossy, frame, specs, ROWS)
+    sampled = light, sample(made), eye, material
+    check_sharded(shade_glossy, sampled, (WHOLE, specs_of(sampled[1], SAMPLED), WHOLE, ROWS), ROWS)
+    own = jnp.asarray(rng.normal(size=(V, 3, K)), np.float32)
+    check_sharded(shade_glossy, (own, made, eye, material), (ROWS, ROWS, WHOLE, ROWS), ROWS)
+
+
+def test_its_gradient_in_the_normals(frame):
+    def slope(normals, light, made, eye, material):
+        def loss(normals):
+            turned = Transfer(made.coefficients, made.positions, normals, made.neighbors)
+            return jnp.sum(shade_glossy(light, turned, eye, material) ** 2)
+
+        return jax.grad(loss)(normals)
+
+    light, made, eye, material = frame
+    arguments = made.normals, light, made, eye, material
+    check_sharded(slope, arguments, (ROWS, WHOLE, ROWS, WHOLE, ROWS), ROWS)
+
+
+def test_samples(frame):
+    made = frame[1]
+    check_sharded(sample, (made,), (ROWS,), specs_of(sample(made), SAMPLED))
+
+
+def test_fixed_views(frame):
+    _, made, eye, material = frame
+    check_sharded(
+        lambda made, eye, material: fixed_view(made, eye, material).coefficients,
+        (made, eye, material),
+        (ROWS, WHOLE, ROWS),
+        ROWS,
+    )
+    check_sharded(
+        lambda light, made, eye, material: fixed_view(made, eye, material)(light),
+        frame,
+        (WHOLE, ROWS, WHOLE, ROWS),
+        ROWS,
+    )
+
+
+def test_fixed_lights(frame):
+    light, made, *_ = frame
+    out = specs_of(fixed_light(light, made), STILL)
+    check_sharded(fixed_light, (light, made), (WHOLE, ROWS), out)
+    check_sharded(
+        lambda light, made, eye, material: fixed_light(light, made)(eye, material),
+        frame,
+        (WHOLE, ROWS, WHOLE, ROWS),
+        ROWS,
+    )
+    one = Material(0.5, 0.5, 8.0)
+    check_sharded(
+        lambda light, made, eye: fixed_light(light, made)(eye, one),
+        frame[:3],
+        (WHOLE, ROWS, WHOLE),
+        ROWS,
+    )
+
+
+def test_unshadowed_transfer_and_its_gradient(frame):
+    made, light = frame[1], frame[0]
+
+    def transfer(positions, normals):
+        return unshadowed(positions, normals, DEGREE)
+
+    def arrays(positions, normals):
+        made = transfer(positions, normals)  # its neighbors are the points' own numbers
+        return made.coefficients, made.positions, made.normals
+
+    arguments = made.positions, made.normals
+    check_sharded(arrays, arguments, (ROWS, ROWS), (ROWS, ROWS, ROWS))
+
+    def slope(positions, normals, light):
+        def loss(normals):
+            return jnp.sum(shade_diffuse(light, transfer(positions, normals), 0.5) ** 2)
+
+        return jax.grad(loss)(normals)
+
+    check_sharded(slope, (*arguments, light), (ROWS, ROWS, WHOLE), ROWS)
+
+
+def test_reflected_directions(frame):
+    _, made, eye, _ = frame
+    arguments = eye, made.positions, made.normals
+    check_sharded(reflected_direction, arguments, (WHOLE, ROWS, ROWS), ROWS)
