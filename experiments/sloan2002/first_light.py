@@ -22,11 +22,16 @@ from ..runner import Column, Context, Table, experiment
 from .bake import OFFSET, Subject, bake, relative_error
 from .pictures import Picture, draw_errors, draw_sheet, draw_variants
 from .reference import Estimate, irradiance
+from .still import draw_still, softened
 
-_SHEET = "shadowed, with a bounce, at the highest degree, before each probe"
+_STILL = "copper on paper: shadows and a bounce in transfer of degree 10, a glossy lobe, one light"
+_SHEET = (
+    "shadowed, with a bounce, at the highest degree, before each probe, whose light is softened"
+)
 _VARIANTS = (
-    "the three variants, what shadows take and what the bounce adds; dark bands along a shadow's "
-    "edge are light that rings below zero, cut off at the highest degree"
+    "the three variants, what shadows take and what the bounce adds, in softened light. Last, the "
+    "light as it is, cut off at the highest degree: dark bands along a shadow's edge are its "
+    "ringing below zero, which the errors measure"
 )
 _WIDTH = 0.8  # of a picture, in its heights
 
@@ -53,6 +58,8 @@ class FirstLight:
     """height of the pictures, in pixels"""
     samples: int = 3
     """rays along each side of a pixel"""
+    still: int = 480
+    """height of the picture of a glossy knot, in pixels; 0 draws none"""
 
     def __post_init__(self):
         if not self.degrees or min(self.degrees) < 0:
@@ -68,6 +75,8 @@ class FirstLight:
             raise ValueError(f"albedo must be above 0 and at most 1, got {self.albedo}")
         if self.size < 16:
             raise ValueError(f"size must be at least 16 pixels, got {self.size}")
+        if self.still and self.still < 16:
+            raise ValueError(f"still must be 0 or at least 16 pixels, got {self.still}")
 
 
 @experiment("first_light")
@@ -104,6 +113,9 @@ def run(config: FirstLight, context: Context) -> list[Table]:
             light, reference = lights[picture.environment], references[picture.environment]
             for row in _errors(config, subject, light, reference, picture):
                 context.record(row)
+    if config.still:
+        with context.time("still"):
+            draw_still(context.path("still.png", _STILL), height=config.still)
     draw_sheet(context.path("first_light.png", _SHEET), pictures)
     caption = f"under {pictures[0][0].environment}: {_VARIANTS}"
     draw_variants(context.path("variants.png", caption), [row[0] for row in pictures])
@@ -126,7 +138,7 @@ def _draw(
     environments: dict[str, Array],
     lights: dict[str, Array],
 ) -> list[Picture]:
-    """Each variant at the highest degree under each environment."""
+    """Draw each variant at the highest degree under each environment, softened."""
     width = round(_WIDTH * config.size)
     camera = imaging.Camera.facing(subject.mesh, width=width, height=config.size)
     with context.time(f"{subject.name}: raster"):
@@ -135,11 +147,13 @@ def _draw(
     for name, environment in environments.items():
         renders = {
             variant: imaging.interpolate(raster, shaded)
-            for variant, shaded in _radiance(config, subject, lights[name]).items()
+            for variant, shaded in _radiance(config, subject, softened(lights[name])).items()
         }
-        exposure = float(imaging.auto_exposure(renders["shadowed"], raster.mask))
+        ringing = imaging.interpolate(raster, _radiance(config, subject, lights[name])["shadowed"])
+        exposure = float(imaging.auto_exposure(ringing, raster.mask))
         background = np.asarray(imaging.backdrop(environment, camera))
         alpha = np.asarray(raster.alpha)[..., None]
+        renders["ringing"] = ringing
         arrays = {variant: np.asarray(render) for variant, render in renders.items()}
         pictures.append(Picture(subject.name, name, arrays, background, alpha, exposure))
     return pictures

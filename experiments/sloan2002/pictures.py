@@ -59,6 +59,7 @@ def draw_variants(path: Path, pictures: list[Picture], gain: float = 4) -> None:
             picture.shown("one bounce"),
             picture.difference("unshadowed", "shadowed", 1),
             picture.difference("one bounce", "shadowed", gain),
+            picture.shown("ringing"),
         ]
         for picture in pictures
     ]
@@ -68,6 +69,7 @@ def draw_variants(path: Path, pictures: list[Picture], gain: float = 4) -> None:
         "one bounce",
         "taken by shadows",
         f"added by the bounce, × {gain:g}",
+        "shadowed, not softened",
     ]
     _draw_cells(path, cells, titles)
 

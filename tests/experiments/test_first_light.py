@@ -4,10 +4,12 @@ import json
 
 import numpy as np
 import pytest
+from matplotlib import pyplot as plt
 
 from experiments.runner import Context, Data
 from experiments.runner.cli import main
 from experiments.sloan2002.reference import Pixels, Receivers, direct, one_bounce, turned
+from experiments.sloan2002.still import draw_still
 from jaxsh.geometry import make_mesh, ray_scene
 
 SMALL = {
@@ -18,6 +20,7 @@ SMALL = {
     "transfer-directions": [2048],
     "size": [40],
     "samples": [2],
+    "still": [0],
 }
 
 
@@ -73,6 +76,20 @@ def test_pictures_and_tables(folder):
         assert f"({picture})" in table
     for title in ("Goals", "Irradiance by degree", "Times", "Meshes"):
         assert f"## {title}\n" in table
+
+
+def test_the_still_has_a_lit_knot_its_shadow_and_no_bands(tmp_path):
+    draw_still(tmp_path / "still.png", height=48, vertices=600, directions=64)
+    image = plt.imread(tmp_path / "still.png")[..., :3]
+    assert image.shape == (48, 72, 3)
+    red = image[..., 0] / image[..., 2] > 1.7  # copper, and the paper is gray
+    assert 0.1 < red.mean() < 0.4
+    # No channel of the light falls below zero, so nothing on the knot is black.
+    assert image[red].max(axis=-1).min() > 0.05
+    # In front and to the right the ground lies in shadow.
+    shadow, lit = image[36:40, 44:50], image[36:40, 4:10]
+    assert shadow.mean() < 0.9 * lit.mean()
+    assert lit.mean() > 0.3
 
 
 def wall():
