@@ -5,7 +5,7 @@ from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from jaxsh import geometry, harmonics, imaging, sphere, transfer
 
@@ -53,17 +53,19 @@ def draw_still(path: Path, *, height: int, vertices: int = 20_000, directions: i
         height=height,
     )
     material = transfer.Material(
-        *(
-            jnp.asarray(np.where(is_knot[:, None], _COPPER[name], _PAPER[name]), jnp.float32)
-            for name in ("diffuse", "specular")
-        ),
-        jnp.asarray(np.where(is_knot, _COPPER["exponent"], _PAPER["exponent"]), jnp.float32),
+        diffuse=_each(is_knot, "diffuse"),
+        specular=_each(is_knot, "specular"),
+        exponent=_each(is_knot, "exponent")[:, 0],
     )
     radiance = transfer.fixed_view(baked, camera.position, material)(light)
     raster = imaging.rasterize(mesh, camera, samples=4)
     image = imaging.interpolate(raster, radiance)
     exposure = 1.35 * imaging.auto_exposure(image)
     plt.imsave(path, np.asarray(imaging.tone_map(image, exposure, curve="reinhard", white=1.7)))
+
+
+def _each(is_knot: Bool[np.ndarray, " v"], name: str) -> Float[Array, "v c"]:
+    return jnp.asarray(np.where(is_knot[:, None], _COPPER[name], _PAPER[name]), jnp.float32)
 
 
 def _on_a_sweep(knot: geometry.Mesh, rows: int) -> geometry.Mesh:
