@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._core.checks import is_concrete
 from .._core.linalg import einsum
-from .._core.xla import keep_rows
+from .._core.xla import keep_rows, rows_are_split
 from ..geometry import Mesh, RayScene, ray_scene
 from ._camera import Camera
 
@@ -105,7 +105,8 @@ def interpolate(
     another shape or of too few vertices, and for a background of another shape.
 
     Differentiable, forward and reverse, in `values`, `background` and the raster's weights. Runs
-    under `jit` and `vmap`; shards over the raster's rows, where `values` are whole on each device.
+    under `jit` and `vmap`. Shards over the raster's rows, where `values` are whole on each device;
+    values that are shared out by vertex are brought together for a picture whole on each device.
 
     **Example**
 
@@ -148,7 +149,9 @@ def _interpolate(raster: Raster, values, background):
         # A background of NaN, as a mark, stays where it is seen.
         return seen + jnp.where(free > 0, free * jnp.broadcast_to(background, seen.shape), 0)
 
-    return keep_rows(pixels, raster, values, background, like=raster.face, axis=0, out=0)
+    if rows_are_split(raster.face):
+        return keep_rows(pixels, raster, values, background, like=raster.face, axis=0, out=0)
+    return keep_rows(pixels, raster, values, background, like=values, axis=0, out=None)
 
 
 def _resolve(samples: Float[Array, "hn wn c"], n: int) -> Float[Array, "h w c"]:

@@ -34,6 +34,25 @@ def test_interpolate_keeps_the_rows_of_the_raster(scene, rng, shape, spec):
     check_sharded(draw, (*raster, mesh.normals, background), specs, ROWS)
 
 
+@pytest.mark.parametrize("kind", [AxisType.Auto, AxisType.Explicit])
+def test_values_shared_out_by_vertex_make_a_whole_picture(scene, kind):
+    """Shading on a mesh of devices ends so, and is drawn and differentiated."""
+    mesh, raster = scene
+    devices = jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+    values = jax.device_put(mesh.normals, NamedSharding(devices, ROWS))
+
+    def loss(values):
+        image = imaging.interpolate(Raster(*raster, 2), values, 0.5)
+        return jnp.sum(image**2), image
+
+    step = jax.jit(jax.value_and_grad(loss, has_aux=True))
+    (_, image), gradient = step(values)
+    (_, whole), expected = step(mesh.normals)
+    np.testing.assert_allclose(image, whole, atol=1e-6)
+    np.testing.assert_allclose(gradient, expected, atol=1e-5)
+    assert image.sharding.is_fully_replicated
+
+
 def test_the_gradient_in_the_background_keeps_the_rows(scene, rng):
     mesh, raster = scene
     background = rng.uniform(size=(8, 6, 3)).astype(np.float32)
