@@ -59,6 +59,21 @@ def in_turn(function, tree):
     return jax.lax.platform_dependent(tree, cpu=loop, default=jax.vmap(function))
 
 
+def varying_as(tree, like):
+    """The arrays of a tree, taken to differ between devices inside `shard_map` as those of `like`.
+
+    A loop wants that of the constants that it starts from.
+    """
+    manual = jax.sharding.AxisType.Manual
+    for leaf in jax.tree.leaves(like):
+        if manual in jax.typeof(leaf).sharding.mesh.axis_types and leaf.size:
+            first = leaf[(0,) * leaf.ndim]
+            # Zero, but only the type knows it: the compiler drops what follows.
+            zero = jnp.where(first == first, 0, 0)
+            tree = jax.tree.map(lambda a, zero=zero: a + zero.astype(a.dtype), tree)
+    return tree
+
+
 def device_cache(maxsize: int):
     """`functools.lru_cache` for constants on a device, apart for each default device and float.
 
@@ -143,7 +158,7 @@ def keep_rows(function, *arguments, like, axis: int, out) -> Any:
     return jax.sharding.auto_axes(function, out_sharding=out)(*arguments)
 
 
-def keep_batch(function, *arrays, ndims: tuple[int, ...]):
+def keep_batch(function, *arrays, ndims: tuple[int, ...]) -> Any:
     """`function(*arrays)`, whose results lead with the batch that the arrays' leading axes make.
 
     For arrays with explicit axes, as `keep_rows`, but for any number of batch axes, sharded as

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Bool, Float
 
 from .._core.checks import flatten_batch
+from .._core.xla import keep_batch
 from ._cube import RadianceCube, texels
 from ._emitters import Polygon, Sphere
 from ._vectors import Components, component_dot
@@ -46,10 +47,16 @@ def _cubes(
     sky: Components,
     point: Float[Array, "*batch 3"],
 ) -> RadianceCube:
-    emitters, blockers = jax.tree.map(lambda a: a.astype(point.dtype), (emitters, blockers))
-    shapes = [*((shape, True) for shape in emitters), *((shape, False) for shape in blockers)]
-    flat = jax.vmap(functools.partial(_cube, shapes, directions, sky))(flatten_batch(point))
-    return jax.tree.map(lambda a: a.reshape(*point.shape[:-1], *a.shape[1:]), flat)
+    shapes = jax.tree.map(lambda a: a.astype(point.dtype), (emitters, blockers))
+    leaves, tree = jax.tree.flatten((*shapes, directions, sky))
+
+    def cubes(point, *leaves):
+        emitters, blockers, directions, sky = jax.tree.unflatten(tree, leaves)
+        shapes = [*((shape, True) for shape in emitters), *((shape, False) for shape in blockers)]
+        flat = jax.vmap(functools.partial(_cube, shapes, directions, sky))(flatten_batch(point))
+        return jax.tree.map(lambda a: a.reshape(*point.shape[:-1], *a.shape[1:]), flat)
+
+    return keep_batch(cubes, point, *leaves, ndims=(1, *(leaf.ndim for leaf in leaves)))
 
 
 def _cube(

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._core.xla import materialize
+from .._core.xla import materialize, on_mesh, varying_as
 from ..harmonics import degrees, evaluate
 from ..harmonics._tables import gradient_table
 from ._vectors import cross, dot, inverse_length, reciprocal, scale
@@ -139,7 +139,7 @@ def _nothing(start: Rows, rows: int, *axes: int) -> tuple[Array, Complex]:
     """Zeros (*axes, rows, n), and the number 1."""
     n = start.shape[-1]
     zero, one = jnp.zeros((*axes, rows, n), start.dtype), jnp.ones(n, start.dtype)
-    return zero, (one, jnp.zeros_like(one))
+    return varying_as((zero, (one, jnp.zeros_like(one))), start)
 
 
 def _product(a: Complex, b: Complex) -> Complex:
@@ -224,6 +224,8 @@ def _times(weights: Complex, nodes: Float[Array, "3 j n"], slope: Float[Array, "
 
 
 def _basis(nodes: Float[Array, "3 j n"], degree: int) -> Float[Array, "k j n"]:
+    if on_mesh(nodes):  # receivers first, since rows of nodes and receivers would be gathered
+        return jnp.swapaxes(evaluate(nodes.T, degree, axis=0), 1, 2)
     return materialize(lambda rows: evaluate(jnp.moveaxis(rows, 0, -1), degree, axis=0), nodes)
 
 

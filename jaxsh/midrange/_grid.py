@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
 from .._core.checks import as_float, is_concrete
+from .._core.xla import on_mesh
 from ._expansion import check_positions
 from ._weights import Cells, Weights
 
@@ -63,7 +64,8 @@ class Grid(eqx.Module):
         than the shading: make the weights once where mesh and grid move together.
 
         **Returns** sparse `Weights` (V, 8) in the dtype of `positions`; those of a single cell,
-        which all positions share, are dense. Differentiable in positions and bounds; across the
+        which all positions share, are dense, and so are those of positions on a mesh of devices,
+        since sorting would gather them. Differentiable in positions and bounds; across the
         faces of cells there is a kink.
 
         Raises `ValueError` unless positions are (V, 3).
@@ -72,6 +74,8 @@ class Grid(eqx.Module):
         if positions.ndim != 2:
             raise ValueError(f"expected positions (V, 3), got shape {positions.shape}")
         lower, upper = self.lower.astype(positions.dtype), self.upper.astype(positions.dtype)
+        if on_mesh(positions):
+            return Weights(_dense(positions, lower, upper, self.shape))
         values, cell = _trilinear(positions, lower, upper, self.shape)
         samples = self._samples()
         if len(samples) == 1:
@@ -119,14 +123,38 @@ def _trilinear(
 ) -> tuple[Float[Array, "v 8"], Int[Array, " v"]]:
     """Weights of the corners of the cell that each position is in, and that cell."""
     spans = np.array(shape, np.int32) - 1
-    scaled = (positions - lower[None]) / (upper - lower)[None]
-    scaled = scaled * jnp.asarray(spans, positions.dtype)[None]
-    whole = jnp.clip(jnp.floor(scaled).astype(jnp.int32), 0, spans[None] - 1)
-    share = scaled - whole.astype(positions.dtype)
+    whole, share = _places(positions, lower, upper, spans)
     sides = jnp.stack([1 - share, share])
     x, y, z = (sides[_CORNERS[:, axis], :, axis] for axis in range(3))
     cell = (whole[:, 0] * spans[1] + whole[:, 1]) * spans[2] + whole[:, 2]
     return (x * y * z).T, cell
+
+
+def _places(positions, lower, upper, spans):
+    """The cell of each position along each axis, and where in it, (V, 3) each."""
+    scaled = (positions - lower[None]) / (upper - lower)[None]
+    scaled = scaled * jnp.asarray(spans, positions.dtype)[None]
+    whole = jnp.clip(jnp.floor(scaled).astype(jnp.int32), 0, spans[None] - 1)
+    return whole, scaled - whole.astype(positions.dtype)
+
+
+@functools.partial(jax.jit, static_argnums=3)
+def _dense(
+    positions: Float[Array, "v 3"],
+    lower: Float[Array, " 3"],
+    upper: Float[Array, " 3"],
+    shape: tuple[int, int, int],
+) -> Float[Array, "v s"]:
+    """The same weights for all samples, most of them zero."""
+    whole, share = _places(positions, lower, upper, np.array(shape, np.int32) - 1)
+    along = []
+    for axis, count in enumerate(shape):
+        sample, cell = np.arange(count, dtype=np.int32)[None], whole[:, axis, None]
+        part = share[:, axis, None]
+        along.append(jnp.where(sample == cell, 1 - part, jnp.where(sample == cell + 1, part, 0)))
+    x, y, z = along
+    products = x[:, :, None, None] * y[:, None, :, None] * z[:, None, None, :]
+    return products.reshape(len(positions), math.prod(shape))
 
 
 @functools.partial(jax.jit, static_argnums=1)

@@ -10,6 +10,7 @@ from jax import lax
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.linalg import matmul
+from .._core.xla import varying_as
 from ._expansion import Expansion, check_positions, monomials, term_orders
 from ._weights import Weights
 
@@ -125,4 +126,5 @@ def over_samples(
         return jnp.moveaxis(jnp.pad(array, widths).reshape(shape), axis, 0)
 
     parts = split(values, values.ndim - 1), split(points, axis), split(terms, axis)
-    return lax.scan(lambda total, part: (add(total, *part), None), total, parts)[0]
+    start = varying_as(total, (total, parts))
+    return lax.scan(lambda total, part: (add(total, *part), None), start, parts)[0]

@@ -16,6 +16,8 @@ from ._visible import Plan, Scene, seen
 
 # Receivers per block: the basis of an arc's nodes stays in cache.
 _BLOCK = 1024
+# And per call of an accelerator, as far as its memory goes.
+_MOST = 262_144
 
 
 def polygon_harmonics(
@@ -128,4 +130,4 @@ def _unit_lights(scene: Scene, points, normals, plan: Plan):
         lights = seen(scene, points.T, normals.T, plan)
         return tuple(jnp.moveaxis(light, (-1, -2), (0, 1)) for light in lights)
 
-    return in_blocks(block, points, normals, size=_BLOCK)
+    return in_blocks(block, points, normals, size=_BLOCK, most=_MOST)

@@ -19,7 +19,7 @@ from jaxtyping import Array, Float
 from .._core.checks import check_degree
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
-from .._core.xla import in_turn
+from .._core.xla import in_turn, keep_batch
 from ..harmonics import degrees, num_coefficients
 from ..harmonics._tables import gradient_table
 from ._cube import RadianceCube, inverse_distances
@@ -47,7 +47,7 @@ def taylor(cube: RadianceCube, degree: int, order: int) -> Expansion:
     if order not in _ORDERS:
         raise ValueError(f"order must be 0, 1, 2 or 3, got {order!r}")
     tables = moment_tables(cube.resolution, check_degree(degree) + order, cube.radiance.dtype)
-    return Expansion(cube.point, each(_terms, cube, tables, degree, order))
+    return Expansion(cube.point, each(_terms, cube, tables, static=(degree, order)))
 
 
 def project_cube(cube: RadianceCube, degree: int) -> Float[Array, "*batch 3 k"]:
@@ -60,17 +60,22 @@ def project_cube(cube: RadianceCube, degree: int) -> Float[Array, "*batch 3 k"]:
     return taylor(cube, degree, 0).coefficients
 
 
-def each(function: Callable[..., Array], cube: RadianceCube, tables: Any, *static: int) -> Array:
+@functools.partial(jax.jit, static_argnums=(0,), static_argnames="static")
+def each(function: Callable[..., Array], cube: RadianceCube, tables: Any, *, static=()) -> Array:
     """`function` of each cube of a batch."""
-    batch = cube.point.shape[:-1]
-    flat = jax.tree.map(lambda a: a.reshape(-1, *a.shape[len(batch) :]), cube)
-    result = _each(function, flat, tables, static)
-    return result.reshape(*batch, *result.shape[1:])
+    batch = cube.point.ndim - 1
+    (rows, cubes), (constants, rest) = jax.tree.flatten(cube), jax.tree.flatten(tables)
 
+    def run(*leaves):
+        tables = jax.tree.unflatten(rest, leaves[len(rows) :])
+        shape = leaves[0].shape[:batch]
+        flat = [row.reshape(math.prod(shape), *row.shape[batch:]) for row in leaves[: len(rows)]]
+        flat = jax.tree.unflatten(cubes, flat)
+        result = in_turn(lambda cube: function(cube, tables, *static), flat)
+        return result.reshape(*shape, *result.shape[1:])
 
-@functools.partial(jax.jit, static_argnums=(0, 3))
-def _each(function, cubes, tables, static):
-    return in_turn(lambda cube: function(cube, tables, *static), cubes)
+    ndims = (*(row.ndim - batch for row in rows), *(constant.ndim for constant in constants))
+    return keep_batch(run, *rows, *constants, ndims=ndims)
 
 
 def _terms(cube, tables, degree: int, order: int) -> Float[Array, "3 k m"]:
