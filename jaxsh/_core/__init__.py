@@ -1,1 +1,1 @@
-"""What all modules share: argument checks, XLA habits, linear algebra, host facts. Private."""
+"""Ground floor of all modules: argument checks, XLA habits, linear algebra, host facts. Private."""

@@ -10,7 +10,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 
 def as_float(value: ArrayLike) -> Float[Array, "..."]:
-    """As a floating-point JAX array; integers become JAX's default float."""
+    """Convert to a floating-point JAX array; integers become JAX's default float."""
     # What is a JAX array already is looked at in every frame.
     array = value if isinstance(value, Array) else jnp.asarray(value)
     if jnp.issubdtype(array.dtype, jnp.floating):

@@ -3,8 +3,8 @@
 Two kernels: the 2(L+1) azimuth rows, then all K rows of the basis at once (see `_tables`). XLA
 would rather fuse the first into the second and compute each azimuth row K/(2L+2) times over.
 
-Derivatives never go through the products. As a solid harmonic r^l y_lm has derivatives that are
-combinations of at most two solid harmonics of degree l-1, one rule written in terms of the basis
+Derivatives never go through the products. A solid harmonic r^l y_lm has derivatives that are
+combinations of at most two solid harmonics of degree l-1, so one rule written in terms of the basis
 itself is right to every order, forward, reverse and mixed, and regular at the poles.
 """
 
@@ -25,9 +25,10 @@ from ._tables import azimuth_table, gradient_table, zenith_table
 def evaluate(
     vectors: Float[ArrayLike, "*batch 3"], degree: int, *, axis: int = -1
 ) -> Float[Array, "..."]:
-    """Real orthonormal spherical harmonics y_i(s/|s|) of nonzero vectors s of any length.
+    """Evaluate the real orthonormal spherical harmonics y_i(s/|s|) of nonzero vectors s.
 
-    Index i = l(l+1) + m, no Condon–Shortley phase: y_1 = √(3/4π)·(y, z, x)/|s|.
+    Vectors may have any length. Index i = l(l+1) + m, no Condon–Shortley phase:
+    y_1 = √(3/4π)·(y, z, x)/|s|.
 
     **Arguments**
 
@@ -42,7 +43,15 @@ def evaluate(
     `ValueError` for a wrong shape, degree or axis.
 
     The batch is the axis along which the kernels run: pass a whole batch rather than `jax.vmap`
-    over single vectors.
+    over single vectors. It may be sharded.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> basis = harmonics.evaluate(jnp.array([[0.0, 0.0, 1.0], [1.0, 1.0, 0.0]]), degree=2)
+    >>> basis.shape, round(float(basis[0, 2]), 3)  # √(3/4π)
+    ((2, 9), 0.489)
     """
     return _evaluate(*_checked(vectors, degree, axis))
 
@@ -50,11 +59,21 @@ def evaluate(
 def evaluate_with_gradient(
     vectors: Float[ArrayLike, "*batch 3"], degree: int, *, axis: int = -1
 ) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
-    """Spherical harmonics y_i(s/|s|) and their gradient d/ds, together.
+    """Evaluate spherical harmonics y_i(s/|s|) and their gradient d/ds, together.
 
-    Arguments, errors and derivatives as for `evaluate`. Returns (..., K) and (..., K, 3), or with
-    `axis=0` (K, ...) and (3, K, ...), the fast layout. The gradient is tangential, s·∇y = 0, and
-    falls off as 1/|s|.
+    Arguments, errors and derivatives are those of `evaluate`. The gradient needs no second
+    recursion: each ∂_k (r^l y_lm) is a combination of at most two harmonics of degree l-1.
+
+    **Returns** (..., K) and (..., K, 3), or with `axis=0` (K, ...) and (3, K, ...), the fast
+    layout. The gradient is tangential, s·∇y = 0, and falls off as 1/|s|. Differentiable again.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> basis, gradient = harmonics.evaluate_with_gradient(jnp.array([0.0, 0.0, 2.0]), degree=1)
+    >>> gradient.shape, round(float(gradient[3, 0]), 3)  # ∂y_11/∂x = √(3/4π)/2
+    ((4, 3), 0.244)
     """
     return _evaluate_with_gradient(*_checked(vectors, degree, axis))
 
@@ -157,7 +176,7 @@ def _with_gradient_jvp(degree, primals, tangents):
 def _derivative_along(
     basis: Float[Array, "k n"], direction: Float[Array, "3 1 n"], degree: int
 ) -> Float[Array, "k n"]:
-    """direction · ∇(r^l y_lm) on the unit sphere."""
+    """Derivative of the solid harmonics on the unit sphere: direction · ∇(r^l y_lm)."""
 
     def row(k, basis, direction, terms):
         return _along(basis, direction, terms, k)
@@ -199,7 +218,7 @@ def _terms(degree: int, dtype) -> list[tuple[Int[Array, "k 3"], Float[Array, "k 
 
 
 def _along(basis: Float[Array, "k n"], direction, terms, k) -> Float[Array, " n"]:
-    """direction · ∇ of row k."""
+    """Derivative of row k along a direction."""
     slopes = (
         factor[k, axis] * _take(basis, row[k, axis]) * direction[axis]
         for row, factor in terms
@@ -211,7 +230,7 @@ def _along(basis: Float[Array, "k n"], direction, terms, k) -> Float[Array, " n"
 def _azimuth(
     unit: Float[Array, "3 1 n"], degree: int
 ) -> tuple[Float[Array, "rows n"], Float[Array, "1 n"], Float[Array, "1 n"]]:
-    """C_0 … C_L, S_0 … S_L, the real and imaginary parts of (x + iy)^m; z; and z² - ½."""
+    """Azimuth rows C_0 … C_L, S_0 … S_L, the parts of (x + iy)^m; z; and z² - ½."""
     # The kind of row, real or imaginary, becomes part of the row, and columns broadcast along n.
     lone, *factors = (np.concatenate(list(table)).T[..., None] for table in azimuth_table(degree))
 

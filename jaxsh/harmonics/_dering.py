@@ -1,4 +1,4 @@
-"""The least window that leaves a light without negative values."""
+"""Search for the least window that leaves a light, or its irradiance, without negative values."""
 
 import functools
 from typing import Literal
@@ -26,16 +26,52 @@ def dering(
     *,
     of: Literal["irradiance", "light"] = "irradiance",
 ) -> tuple[Float[Array, "*batch k"], Float[Array, "*batch"]]:
-    """The least `damping` that leaves a function without negative values, and its strength.
+    """Window a light by the least `damping` that leaves it without negative values.
 
-    Each function of the batch, each colour channel too, gets a window of its own: for one window
-    over the channels, use `damping` with the largest of their strengths.
+    A truncated light rings: behind a bright source it goes below zero (Sloan 2008). A diffuse
+    surface sees the light convolved with the clamped cosine, which takes far less of a window, or
+    none.
 
-    What is left below zero is under 1e-3 of the mean, and mostly far under. A function without
-    negative values is returned as it is, with strength 0; one whose mean is not positive cannot be
-    helped and keeps nothing but its mean, with strength infinity; NaN gives NaN. Differentiable
-    once, by the implicit function theorem, with a kink where the strength reaches zero or the
-    darkest direction jumps; a second derivative raises `NotImplementedError`.
+    **Arguments**
+
+    - `coefficients`: (..., K). Each function of the batch, each color channel too, gets a window of
+      its own: for one window over the channels, use `damping` with the largest of their strengths.
+    - `of`: what must have no negative value: `"irradiance"`, that of unshadowed diffuse surfaces,
+      or `"light"`, the function itself, as for a picture of the light or a glossy surface.
+
+    **Returns** the windowed coefficients (..., K) and the strengths (...). What is left below zero
+    is under 1e-3 of the mean, and mostly far under. A function that needs no window is returned as
+    it is, with strength 0; one whose mean is not positive cannot be helped and keeps nothing but
+    its mean, with strength infinity; NaN gives NaN. Differentiable once, by the implicit function
+    theorem, with a kink where the strength reaches zero or the darkest direction jumps; a second
+    derivative raises `NotImplementedError`. Raises `ValueError` where K is not a square and for
+    another `of`.
+
+    **Cost** on five light probes (grace, galileo, eucalyptus, stpeters, uffizi): mean error of
+    irradiance over a mesh's normals in % of its mean, least to greatest of the probes, one window
+    for the three channels. `python -m experiments run environment --preset paper` prints it.
+
+    | window | degree 2 | degree 6 | degree 10 |
+    |---|---|---|---|
+    | none | 1.5–4.0 | 0.3–1.0 | 0.1–0.5 |
+    | `dering` | 1.5–14.2 | 0.3–1.0 | 0.1–0.5 |
+    | `window("lanczos")` | 6.8–18.4 | 1.9–4.0 | 0.9–1.7 |
+    | `window("hann")` | 9.2–24.5 | 2.5–5.8 | 1.2–2.5 |
+    | `dering(of="light")` | 2.3–27.6 | 1.5–32.2 | 0.8–32.3 |
+
+    By default one of the probes needs a window, grace at degree 2, and from degree 4 on none does;
+    their light then has negative parts of 2–30 % of its integral, which a diffuse surface does
+    not see. A light with one small bright source loses most by `of="light"`, at any degree.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> light = jnp.array([3.545, 0.0, 9.21, 0.0])  # 1 + 4.5 z
+    >>> _, for_surfaces = harmonics.dering(light)
+    >>> _, for_itself = harmonics.dering(light, of="light")
+    >>> round(float(for_surfaces), 1), round(float(for_itself), 1)
+    (0.5, 0.9)
     """
     coefficients = as_float(coefficients)
     degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)

@@ -1,4 +1,4 @@
-"""Where y_lm lives: coefficient i = l(l+1) + m, degree l = 0..L, order m = -l..l ("ACN")."""
+"""Order of the coefficients: i = l(l+1) + m, degree l = 0..L, order m = -l..l ("ACN")."""
 
 import math
 import operator
@@ -10,14 +10,29 @@ from .._core.checks import check_degree
 
 
 def num_coefficients(degree: int) -> int:
-    """Number of coefficients K = (degree + 1)² of a function of this degree."""
+    """Count the coefficients of a function of this degree: K = (degree + 1)².
+
+    Raises `ValueError` unless `degree` is an integer >= 0.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> harmonics.num_coefficients(10)
+    121
+    """
     return (check_degree(degree) + 1) ** 2
 
 
 def degree_of(count: int) -> int:
-    """Degree of a function with `count` coefficients; the inverse of `num_coefficients`.
+    """Find the degree of a function with `count` coefficients: the inverse of `num_coefficients`.
 
     Raises `ValueError` where `count` is not a square: 1, 4, 9, 16, …
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> harmonics.degree_of(9)
+    2
     """
     bands = math.isqrt(count) if isinstance(count, int | np.integer) and count > 0 else 0
     if bands == 0 or bands**2 != count:
@@ -28,9 +43,15 @@ def degree_of(count: int) -> int:
 
 
 def index(l: int, m: int) -> int:
-    """Position l(l+1) + m of y_lm on the coefficient axis.
+    """Locate y_lm on the coefficient axis: l(l+1) + m.
 
     Raises `ValueError` unless l ≥ 0 and |m| ≤ l.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> harmonics.index(2, -1)
+    5
     """
     l, m = operator.index(l), operator.index(m)
     if l < 0 or abs(m) > l:
@@ -39,13 +60,27 @@ def index(l: int, m: int) -> int:
 
 
 def degrees(degree: int) -> Int[np.ndarray, " k"]:
-    """Degree l of each of the K coefficients: 0, 1, 1, 1, 2, …"""
+    """List the degree l of each of the K coefficients: 0, 1, 1, 1, 2, … as NumPy int32.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> harmonics.degrees(1).tolist()
+    [0, 1, 1, 1]
+    """
     # int32, as an index and as a factor the same with and without x64.
     ls = np.arange(check_degree(degree) + 1, dtype=np.int32)
     return np.repeat(ls, 2 * ls + 1)
 
 
 def orders(degree: int) -> Int[np.ndarray, " k"]:
-    """Order m of each of the K coefficients: 0, -1, 0, 1, -2, …"""
+    """List the order m of each of the K coefficients: 0, -1, 0, 1, -2, … as NumPy int32.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> harmonics.orders(1).tolist()
+    [0, -1, 0, 1]
+    """
     l = degrees(degree)
     return np.arange(len(l), dtype=np.int32) - l * (l + 1)

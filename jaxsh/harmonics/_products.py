@@ -1,7 +1,7 @@
 """Products of functions on the sphere.
 
-Everything here is ∫ y_i y_j y_k over a grid that is exact for it: sample, multiply, project, which
-are dense matrix products with the basis on the grid, and need no tensor of K³ entries.
+All integrals are over a grid that is exact for them: sample, multiply, project. These are dense
+matrix products with the basis on the grid, and need no tensor of K³ entries.
 """
 
 import functools
@@ -25,9 +25,17 @@ _BLOCK, _LARGE = 1024, 2**18
 
 
 def gaunt(degree: int) -> Float[Array, "k k k"]:
-    """G_ijk = ∫ y_i y_j y_k dω, dense, in JAX's default float type.
+    """Tabulate the triple integrals of the basis, G_ijk = ∫ y_i y_j y_k dω.
 
-    Exact zeros are zero. Needs 8 K³ bytes: 14 MB at degree 10, 60 MB at 13.
+    **Returns** a dense (K, K, K) in JAX's default float type, computed on the host in float64.
+    Exact zeros are zero. It needs 8 K³ bytes: 14 MB at degree 10, 60 MB at 13; `product` and
+    `triple_integral` do without.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> harmonics.gaunt(1).shape
+    (4, 4, 4)
     """
     return jnp.asarray(_gaunt(check_degree(degree)), jnp.result_type(float))
 
@@ -37,12 +45,25 @@ def product(
     g: Float[ArrayLike, "*batch_g kg"],
     degree: int | None = None,
 ) -> Float[Array, "*batch k"]:
-    """Coefficients of the product f·g, up to `degree` (default: that of the larger input).
+    """Multiply two functions: coefficients of f·g.
 
-    f·g has the degrees of f and g together: asked for that degree the product is exact, below it
-    is the exact product's projection. Batches broadcast; the degrees of f and g may differ.
-    Bilinear and differentiable. Raises `ValueError` where K is not a square or batches do not
-    broadcast.
+    **Arguments**
+
+    - `f`, `g`: (..., K_f) and (..., K_g). Batches broadcast; degrees may differ.
+    - `degree`: of the result, by default that of the larger input. f·g has the degrees of f and g
+      together: up to that degree the product is exact, below it is the exact one's projection.
+
+    **Returns** (..., K) in the wider dtype of the two. Bilinear and differentiable in both. Raises
+    `ValueError` where K is not a square or batches do not broadcast.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> z = jnp.array([0.0, 0.0, 1.0, 0.0])  # y_10
+    >>> squared = harmonics.product(z, z, degree=2)
+    >>> squared.shape, round(float(squared[0]), 3)  # 1/√(4π)
+    ((9,), 0.282)
     """
     f, g, f_degree, g_degree = _checked_pair(f, g)
     check_batches(f=f.shape, g=g.shape)
@@ -55,7 +76,20 @@ def triple_integral(
     g: Float[ArrayLike, "*batch_g kg"],
     h: Float[ArrayLike, "*batch_h kh"],
 ) -> Float[Array, "*batch"]:
-    """∫ f g h dω = Σ_ijk G_ijk f_i g_j h_k, for functions of any degrees. Batches broadcast."""
+    """Integrate the product of three functions: ∫ f g h dω = Σ_ijk G_ijk f_i g_j h_k.
+
+    `f`, `g` and `h` are (..., K) of any degrees; batches broadcast. **Returns** (...). Trilinear
+    and differentiable in all three. Raises `ValueError` where K is not a square or batches do not
+    broadcast.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> z = jnp.array([0.0, 0.0, 1.0, 0.0])  # y_10
+    >>> round(float(harmonics.triple_integral(z, z, jnp.ones(1))), 3)  # 1/√(4π)
+    0.282
+    """
     f, g, *_ = _checked_pair(f, g)
     g, h, _, h_degree = _checked_pair(g, h)
     check_batches(f=f.shape, g=g.shape, h=h.shape)
@@ -66,11 +100,27 @@ def triple_integral(
 def product_matrix(
     f: Float[ArrayLike, "*batch kf"], degree: int | None = None
 ) -> Float[Array, "*batch k k"]:
-    """Matrix M of the multiplication with f: M @ g = coefficients of f·g, at g's own degree.
+    """Build the matrix that multiplies functions by f: M @ g = coefficients of f·g.
 
-    M_ij = ∫ f y_i y_j dω, symmetric. `degree` is that of g and of the result (default: f's).
-    For a light f and a transfer function g this is the operator that shades with it (Lee & Kim
-    2014, L̂ of eq. 3). Linear and differentiable in f.
+    M_ij = ∫ f y_i y_j dω, symmetric. For a light f and a transfer function g this is the operator
+    that shades with it (Lee & Kim 2014, L̂ of eq. 3).
+
+    **Arguments**
+
+    - `f`: (..., K_f).
+    - `degree`: of g and of the result, by default f's.
+
+    **Returns** (..., K, K). Linear and differentiable in f. Raises `ValueError` where K_f is not a
+    square.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> one = jnp.array([3.5449077, 0.0, 0.0, 0.0])  # √(4π) y_00 = 1
+    >>> matrix = harmonics.product_matrix(one)
+    >>> round(float(matrix[2, 2]), 3), round(float(matrix[2, 3]), 3) + 0.0
+    (1.0, 0.0)
     """
     f = as_float(f)
     f_degree = degree_of(f.shape[-1] if f.ndim else 0)

@@ -17,16 +17,28 @@ from ._tables import even_grid
 def rotation_matrix(
     rotation: Float[ArrayLike, "*batch 3 3"], degree: int
 ) -> Float[Array, "*batch k k"]:
-    """Matrix D with which `D @ c` are the coefficients of f(Rᵀω): the function f turned by R.
+    """Build the matrix D that turns functions by R: `D @ c` are the coefficients of f(Rᵀω).
 
-    Any degree; block diagonal with one block per degree. D_ij = ∫ y_i(ω) y_j(Rᵀω) dω by a
-    quadrature that is exact for it, so D is as smooth in R as the basis in its argument: there
-    are no Euler angles to be singular, and derivatives are right at the identity and at half
-    turns too. Reflections are as welcome as rotations.
+    D_ij = ∫ y_i(ω) y_j(Rᵀω) dω by a quadrature that is exact for it, so D is as smooth in R as the
+    basis in its argument: there are no Euler angles to be singular, and derivatives are right at
+    the identity and at half turns too.
 
-    Raises `ValueError` for a wrong shape and, where values are known before tracing, for a matrix
-    that is not orthogonal to 1e-3. Differentiable in `rotation`, along any direction: f(Rᵀω/|Rᵀω|)
-    is its extension to matrices that are not orthogonal.
+    **Arguments**
+
+    - `rotation`: (..., 3, 3), orthogonal; reflections too. Differentiable along any direction:
+      f(Rᵀω/|Rᵀω|) is the extension to matrices that are not orthogonal.
+    - `degree`: any, known at trace time.
+
+    **Returns** (..., K, K), block diagonal with one block per degree. Raises `ValueError` for a
+    wrong shape and, where values are known before tracing, for a matrix that is not orthogonal to
+    1e-3.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> harmonics.rotation_matrix(jnp.eye(3), degree=2).shape
+    (9, 9)
     """
     rotation = _checked_rotation(rotation)
     return _rotation_matrix(rotation, check_degree(degree))
@@ -35,10 +47,25 @@ def rotation_matrix(
 def rotate(
     coefficients: Float[ArrayLike, "*batch k"], rotation: Float[ArrayLike, "*rotations 3 3"]
 ) -> Float[Array, "*out k"]:
-    """Coefficients of f(Rᵀω): the function turned by R. See `rotation_matrix`.
+    """Turn functions by rotations: coefficients of f(Rᵀω). See `rotation_matrix`.
 
-    Batches of functions and of rotations broadcast against each other. Linear in the coefficients
-    and differentiable in both.
+    **Arguments**
+
+    - `coefficients`: (..., K).
+    - `rotation`: (..., 3, 3). Batches of functions and of rotations broadcast.
+
+    **Returns** (..., K) in the dtype of the coefficients. Linear in the coefficients and
+    differentiable in both. Raises `ValueError` as `rotation_matrix` does.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> x = harmonics.evaluate(jnp.array([1.0, 0.0, 0.0]), degree=1)  # a lobe along +x
+    >>> about_z = jnp.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> y = harmonics.rotate(x, about_z)
+    >>> round(float(y[1]), 3)  # along +y: √(3/4π)
+    0.489
     """
     coefficients = as_float(coefficients)
     degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
@@ -53,10 +80,25 @@ def rotate(
 def rotate_z(
     coefficients: Float[ArrayLike, "*batch k"], angle: Float[ArrayLike, "*angles"]
 ) -> Float[Array, "*out k"]:
-    """Turn a function by `angle` radians about +z, from +x towards +y: O(K), no matrix.
+    """Turn functions by `angle` radians about +z, from +x towards +y: O(K), no matrix.
 
-    c'_lm = cos(mα) c_lm - sin(mα) c_l,-m (Habel et al. 2008, eq. 4, with m signed). Batches of
-    functions and of angles broadcast. Differentiable in both.
+    c'_lm = cos(mα) c_lm - sin(mα) c_l,-m (Habel et al. 2008, eq. 4, with m signed).
+
+    **Arguments**
+
+    - `coefficients`: (..., K).
+    - `angle`: (...), in radians. Batches of functions and of angles broadcast.
+
+    **Returns** (..., K) in the dtype of the coefficients. Differentiable in both. Raises
+    `ValueError` where K is not a square or batches do not broadcast.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> x = harmonics.evaluate(jnp.array([1.0, 0.0, 0.0]), degree=1)  # a lobe along +x
+    >>> round(float(harmonics.rotate_z(x, jnp.pi / 2)[1]), 3)  # along +y: √(3/4π)
+    0.489
     """
     coefficients = as_float(coefficients)
     degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)

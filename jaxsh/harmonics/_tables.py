@@ -1,6 +1,6 @@
 """Constants of the basis, computed once per degree on the host in float64.
 
-y_lm(x, y, z) = Z_lm(z) · T_m(x, y) on the unit sphere, where Z_lm is a polynomial of degree l-|m|
+On the unit sphere y_lm(x, y, z) = Z_lm(z) · T_m(x, y), where Z_lm is a polynomial of degree l-|m|
 and parity (-1)^(l-m), and T_m is the real or imaginary part of (x + iy)^|m|:
 C_m = r^m cos(mφ) for m ≥ 0, S_|m| = r^|m| sin(|m|φ) for m < 0, with r = sin θ.
 
@@ -45,7 +45,9 @@ class ZenithTable(NamedTuple):
 
 
 class GradientTable(NamedTuple):
-    """∂_k (r^l y_lm) = first_k y[first_row] + second_k y[second_row], k = x, y, z.
+    """Gradient of the solid harmonics: two terms for each axis k.
+
+    ∂_k (r^l y_lm) = first_k y[first_row] + second_k y[second_row].
 
     The solid harmonics r^l y_lm are harmonic polynomials, so each derivative is one of degree
     l-1, and the ladder operators ∂x ± i∂y show that at most two orders take part.
@@ -139,7 +141,7 @@ def gradient_table(degree: int) -> GradientTable:
 
 @functools.lru_cache(maxsize=32)
 def _sectoral(m: int) -> float:
-    """Leading factor of y_mm = _sectoral(m) · C_m."""
+    """Leading factor of y_mm: `_sectoral(m) · C_m`."""
     k = np.arange(1, m + 1)
     return np.sqrt(np.prod((2 * k + 1) / (2 * k)) / (4 * np.pi)) * (np.sqrt(2) if m else 1)
 
@@ -158,12 +160,25 @@ def _positive_roots(l: int, m: int) -> Float[np.ndarray, " pairs"]:
 
 
 def legendre(cos_theta: Float[np.ndarray, " n"], degree: int) -> Float[np.ndarray, "k n"]:
-    """Meridian profile of every harmonic, on the host: constants for separable transforms.
+    """Tabulate the meridian of every harmonic, on the host: constants for separable transforms.
 
     y_lm(θ, φ) = legendre_lm(cos θ) · (cos mφ for m ≥ 0, sin |m|φ for m < 0).
 
-    `cos_theta` is a NumPy array in [-1, 1]; the result is NumPy float64, by the usual three-term
-    recursion in l, stable to high degree and independent of `evaluate`. Not differentiable.
+    **Arguments**
+
+    - `cos_theta`: (N,), a NumPy array in [-1, 1].
+    - `degree`: the largest l.
+
+    **Returns** (K, N) in NumPy float64, by the usual three-term recursion in l, stable to high
+    degree and independent of `evaluate`. NumPy only: not for traced or sharded arrays, not
+    differentiable. Raises `ValueError` for cosines out of range.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import harmonics
+    >>> harmonics.legendre(np.array([0.0, 1.0]), degree=2).shape
+    (9, 2)
     """
     check_degree(degree)
     z = np.asarray(cos_theta, np.float64)

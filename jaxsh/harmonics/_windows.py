@@ -1,4 +1,4 @@
-"""Windows: what keeps a truncated light from going negative behind its bright source."""
+"""Windows: factors per band against the ringing that leaves a truncated light negative."""
 
 from typing import Literal
 
@@ -15,9 +15,9 @@ WINDOWS = ("none", "hann", "lanczos", "zonal-sinc")
 def window(
     kind: Literal["none", "hann", "lanczos", "zonal-sinc"], degree: int
 ) -> Float[Array, " k"]:
-    """Fixed window, shape (K,) in JAX's default float type: multiply coefficients by it.
+    """Make a fixed window to multiply coefficients by, shape (K,) in JAX's default float type.
 
-    With N = degree + 1 bands:
+    For N = degree + 1 bands the factors are:
 
     - `"none"`: ones;
     - `"hann"`: (1 + cos(πl/N))/2;
@@ -26,7 +26,14 @@ def window(
       the horizon.
 
     The stronger the window, the less ringing and the more blur: `dering` finds the least that a
-    given function needs.
+    given light needs, and its docstring says what each costs. Raises `ValueError` for another
+    kind.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> [round(float(w), 3) for w in harmonics.window("hann", degree=1)]
+    [1.0, 0.5, 0.5, 0.5]
     """
     l, bands = degrees(degree), check_degree(degree) + 1
     match kind:
@@ -44,10 +51,25 @@ def window(
 
 
 def damping(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "*batch k"]:
-    """The window 1 / (1 + strength·l²(l+1)²) that `dering` uses (Sloan 2008), shape (..., K).
+    """Make the window 1 / (1 + strength·l²(l+1)²) that `dering` uses (Sloan 2008).
 
-    It minimises the squared error plus `strength` times the squared Laplacian. Strength zero is
-    no window; infinity leaves the mean alone. Differentiable in the strength.
+    It minimises the squared error plus `strength` times the squared Laplacian.
+
+    **Arguments**
+
+    - `strength`: (...), at least 0. Zero is no window; infinity keeps nothing but the mean.
+      Differentiable.
+    - `degree`: the largest l, known at trace time.
+
+    **Returns** factors (..., K) in the dtype of the strength. Raises `ValueError` for a negative
+    strength, where its value is known before tracing.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> window = harmonics.damping(0.25, degree=2)
+    >>> round(float(window[1]), 3), round(float(window[4]), 3)
+    (0.5, 0.1)
     """
     strength = as_float(strength)
     if is_concrete(strength) and np.any(np.asarray(strength) < 0):
@@ -55,6 +77,6 @@ def damping(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "
     strength = strength[..., None]
     squared = ((degrees(degree) * (degrees(degree) + 1.0)) ** 2).astype(strength.dtype)
     strength, squared = align(strength, jnp.asarray(squared))
-    # The mean is set apart: an infinite strength times its zero would be no number.
+    # The mean is set apart: an infinite strength times its zero would be NaN.
     damped = 1 / (1 + strength * jnp.where(squared > 0, squared, 1))
     return jnp.where(squared > 0, damped, jnp.ones_like(damped))

@@ -9,10 +9,19 @@ from ._indexing import degree_of, degrees
 
 
 def clamped_cosine(degree: int) -> Float[Array, " bands"]:
-    """Zonal coefficients g_l of max(0, cos θ), shape (degree+1,), in JAX's default float type.
+    """Make the zonal coefficients g_l of max(0, cos θ), which turn radiance into irradiance.
 
-    In closed form (Ramamoorthi & Hanrahan 2001): λ_l = π, 2π/3, π/4, 0, -π/24, …, zero at odd
-    l > 1. Convolution with it turns radiance into irradiance. The same as `phong(1, degree)`.
+    Closed form (Ramamoorthi & Hanrahan 2001, eq. 8 and 9): λ_l = π, 2π/3, π/4, 0, -π/24, …, zero
+    at odd l > 1, where λ_l = √(4π/(2l+1)) g_l. The same as `phong(1, degree)`.
+
+    **Returns** (degree+1,) in JAX's default float type, for `convolve`. `sphere.irradiance` does
+    both.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> [round(float(g), 3) for g in harmonics.clamped_cosine(degree=3)]
+    [0.886, 1.023, 0.495, 0.0]
     """
     return phong(jnp.ones(()), degree)
 
@@ -20,13 +29,25 @@ def clamped_cosine(degree: int) -> Float[Array, " bands"]:
 def phong(
     exponent: Float[ArrayLike, "*batch"], degree: int, *, normalized: bool = False
 ) -> Float[Array, "*batch bands"]:
-    """Zonal coefficients g_l of the lobe max(0, cos θ)^exponent, shape (..., degree+1).
+    """Make the zonal coefficients g_l of the lobe max(0, cos θ)^exponent.
 
     λ_l = 2π I_l, where I_l = ∫_0^1 x^k P_l(x) dx obeys I_l = I_{l-2} (k-l+2)/(k+l+1) from
-    I_0 = 1/(k+1) and I_1 = 1/(k+2), for any real exponent k > -1; differentiable in it.
-    `normalized` divides by λ_0, so that the lobe integrates to one and keeps a constant light.
+    I_0 = 1/(k+1) and I_1 = 1/(k+2), for any real exponent k > -1.
 
-    Raises `ValueError` where the exponent's value is known and not finite and above -1.
+    **Arguments**
+
+    - `exponent`: (...), k above -1. Differentiable.
+    - `degree`: the largest l, known at trace time.
+    - `normalized`: divide by λ_0, so that the lobe integrates to one and keeps a constant light.
+
+    **Returns** (..., degree+1) in the dtype of the exponent, for `convolve`. Raises `ValueError`
+    where the exponent's value is known before tracing and not finite and above -1.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> harmonics.phong(32.0, degree=4, normalized=True).shape
+    (5,)
     """
     check_degree(degree)
     k = as_float(exponent)
@@ -44,10 +65,26 @@ def phong(
 def convolve(
     coefficients: Float[ArrayLike, "*batch k"], zonal: Float[ArrayLike, "*kernels bands"]
 ) -> Float[Array, "*out k"]:
-    """Convolution of a function with a zonal kernel g: band l times λ_l = √(4π/(2l+1)) g_l.
+    """Convolve a function with a zonal kernel g: band l times λ_l = √(4π/(2l+1)) g_l.
 
-    (f * g)(n) = ∫ f(ω) g(ω·n) dω. The kernel has one coefficient per band of the function.
-    Batches broadcast. Bilinear and differentiable. Raises `ValueError` where the degrees differ.
+    (f * g)(n) = ∫ f(ω) g(ω·n) dω.
+
+    **Arguments**
+
+    - `coefficients`: (..., K) of f.
+    - `zonal`: (..., degree+1), one g_l per band of f, as of `phong`. Batches broadcast.
+
+    **Returns** (..., K) in the dtype of `coefficients`. Bilinear and differentiable in both.
+    Raises `ValueError` where the degrees differ.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> light = jnp.zeros((3, 9)).at[:, 0].set(1.0)
+    >>> irradiance = harmonics.convolve(light, harmonics.clamped_cosine(2))
+    >>> round(float(irradiance[0, 0]), 3)
+    3.142
     """
     coefficients, zonal = as_float(coefficients), as_float(zonal)
     degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
@@ -63,5 +100,5 @@ def convolve(
 
 
 def _unit_lambdas(degree: int, dtype) -> Float[Array, " bands"]:
-    """λ_l / g_l."""
+    """Ratios λ_l / g_l = √(4π/(2l+1))."""
     return jnp.asarray(np.sqrt(4 * np.pi / (2 * np.arange(degree + 1) + 1)), dtype)

@@ -1,6 +1,6 @@
 """Lat-long pictures: projection and reconstruction that separate into rows and meridians.
 
-y_lm(θ, φ) = P_lm(θ) · cos or sin(|m|φ), so a picture's sums along its rows, one per order, are
+Since y_lm(θ, φ) = P_lm(θ) · cos or sin(|m|φ), a picture's sums along its rows, one per order, are
 all that its coefficients need: W·H·(2L+1) + H·K multiplications in place of W·H·K.
 """
 
@@ -19,14 +19,27 @@ from ._quadrature import fejer_weights
 
 
 def project_lat_long(image: Float[ArrayLike, "h w c"], degree: int) -> Float[Array, "c k"]:
-    """Coefficients of a lat-long picture: (H, W, C) -> (C, K).
+    """Project a lat-long picture onto the basis: light from an environment map.
 
-    Row 0 touches +z, column 0 starts at φ = 0 and φ grows to the right (`docs/conventions.md`).
-    Exact for a picture of a function of degree D where degree + D < H and degree + D < W; the
-    weights are those of `lat_long`. Linear and differentiable.
+    **Arguments**
 
-    Raises `ValueError` for a picture too small for the degree: height and width must be above
-    2·degree.
+    - `image`: (H, W, C), linear radiance. Row 0 touches +z, column 0 starts at φ = 0 and φ grows to
+      the right (`docs/conventions.md`).
+    - `degree`: the largest l, known at trace time.
+
+    **Returns** coefficients (C, K) in the dtype of the picture, exact for a picture of a function
+    of degree D where degree + D < H and degree + D < W; the weights are those of `lat_long`.
+    Linear and differentiable. Rows, columns or channels may be sharded over a mesh; inside
+    `shard_map` a part of a picture would pass for a whole one, so only channels may be. Raises
+    `ValueError` for a picture too small for the degree: height and width must be above 2·degree.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import sphere
+    >>> light = sphere.project_lat_long(jnp.ones((8, 16, 3)), degree=2)
+    >>> light.shape, round(float(light[0, 0]), 3)  # √(4π)
+    ((3, 9), 3.545)
     """
     image, degree = as_float(image), check_degree(degree)
     if image.ndim != 3:
@@ -43,9 +56,17 @@ def project_lat_long(image: Float[ArrayLike, "h w c"], degree: int) -> Float[Arr
 def reconstruct_lat_long(
     coefficients: Float[ArrayLike, "c k"], height: int, width: int
 ) -> Float[Array, "h w c"]:
-    """Lat-long picture of functions, sampled at the pixel centres: (C, K) -> (H, W, C).
+    """Draw functions as a lat-long picture, sampled at the pixel centers: (C, K) -> (H, W, C).
 
-    Linear and differentiable. The inverse of `project_lat_long` on large enough pictures.
+    Linear and differentiable. The inverse of `project_lat_long` on large enough pictures. Raises
+    `ValueError` where K is not a square or a size is not an integer >= 1.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import sphere
+    >>> sphere.reconstruct_lat_long(jnp.zeros((3, 9)), height=4, width=8).shape
+    (4, 8, 3)
     """
     coefficients = as_float(coefficients)
     if coefficients.ndim != 2:
@@ -90,7 +111,7 @@ def _reconstruct(coefficients, height: int, width: int):
 def _tables(
     height: int, width: int, degree: int
 ) -> tuple[Float[np.ndarray, "m l h"], Float[np.ndarray, "m w"]]:
-    """P_lm of each row, by order and degree, zero where l < |m|; and cos mφ or sin |m|φ."""
+    """Meridians P_lm by order, degree and row, zero where l < |m|; azimuths cos mφ or sin |m|φ."""
     theta = (np.arange(height) + 0.5) * np.pi / height
     phi = (np.arange(width) + 0.5) * 2 * np.pi / width
     meridians = np.zeros((2 * degree + 1, degree + 1, height))

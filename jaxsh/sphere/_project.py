@@ -1,4 +1,4 @@
-"""From samples to coefficients and back, and to irradiance: the basis is never held as a whole.
+"""Samples to coefficients and back, and irradiance: the basis is never held as a whole.
 
 On the CPU a block's basis is multiplied while it is still in cache; on an accelerator blocks are as
 large as memory allows, mostly all at once.

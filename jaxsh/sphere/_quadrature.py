@@ -10,7 +10,22 @@ from ..harmonics._tables import exact_grid
 
 
 class Quadrature(eqx.Module):
-    """∫ f dω ≈ Σ_n weights_n f(directions_n), with unit directions and positive weights."""
+    """Directions with weights, which turn integrals into sums: ∫ f dω ≈ Σ_n w_n f(ω_n).
+
+    - `directions`: (N, 3), of length 1.
+    - `weights`: (N,), in steradians, which sum to 4π in those that are made here.
+
+    A pytree, differentiable in both where `project` uses it. Raises `ValueError` where the shapes
+    do not fit.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import sphere
+    >>> hemispheres = sphere.Quadrature(jnp.array([[0.0, 0, 1], [0, 0, -1]]), jnp.full(2, 6.2832))
+    >>> round(float(hemispheres.weights.sum()), 2)
+    12.57
+    """
 
     directions: Float[Array, "n 3"] = eqx.field(converter=jnp.asarray)
     weights: Float[Array, " n"] = eqx.field(converter=jnp.asarray)
@@ -24,20 +39,35 @@ class Quadrature(eqx.Module):
 
 
 def gauss_legendre(degree: int) -> Quadrature:
-    """Exact for polynomials of `degree`: products of harmonics whose degrees sum up to it.
+    """Make the quadrature that is exact for products of harmonics whose degrees sum to `degree`.
 
     Gauss–Legendre in cos θ and degree + 1 equal steps in φ, about degree²/2 directions: the
     fewest of the quadratures here. To project a function of degree L onto degree L take 2L.
+    Raises `ValueError` unless `degree` is an integer >= 0.
+
+    **Example**
+
+    >>> from jaxsh import sphere
+    >>> sphere.gauss_legendre(degree=4).directions.shape
+    (15, 3)
     """
     grid = exact_grid(check_size("degree", degree, least=0), 0)
     return _quadrature(grid.directions, grid.weights)
 
 
 def fibonacci(count: int) -> Quadrature:
-    """`count` directions of equal weight along a spiral: even coverage at any number.
+    """Spread `count` directions of equal weight along a spiral: even coverage at any number.
 
     Not exact for any degree. The error falls about as count^-3/2 for smooth functions and as
-    count^-3/4 for those with edges, where an exact quadrature is no better.
+    count^-3/4 for those with edges, where an exact quadrature is no better. Raises `ValueError`
+    unless `count` is an integer >= 1.
+
+    **Example**
+
+    >>> from jaxsh import sphere
+    >>> quadrature = sphere.fibonacci(100)
+    >>> round(float(quadrature.weights.sum()), 2)
+    12.57
     """
     n = np.arange(check_size("count", count))
     golden = (1 + np.sqrt(5)) / 2
@@ -48,19 +78,25 @@ def fibonacci(count: int) -> Quadrature:
 
 
 def cube_map(resolution: int) -> Quadrature:
-    """Texel centres and exact texel solid angles of a cube map, 6·resolution² of them.
+    """Make the quadrature of a cube map: 6·resolution² texel centers with their exact solid angles.
 
     Faces in the order +x, -x, +y, -y, +z, -z, each row by row, with the texel directions of
     OpenGL's and Direct3D's table: on +x, for one, (1, -v, -u) at column u and row v in [-1, 1].
     Exact for functions that are constant on each texel; otherwise the error falls as
-    resolution^-2.
+    resolution^-2. Raises `ValueError` unless `resolution` is an integer >= 1.
+
+    **Example**
+
+    >>> from jaxsh import sphere
+    >>> sphere.cube_map(4).directions.shape
+    (96, 3)
     """
     edge = np.linspace(-1, 1, check_size("resolution", resolution) + 1)
-    centre = (edge[1:] + edge[:-1]) / 2
+    center = (edge[1:] + edge[:-1]) / 2
     # The integral of (1 + u² + v²)^-3/2 over [0, a] × [0, b] is atan(ab/√(1 + a² + b²)).
     corner = np.arctan2(np.multiply.outer(edge, edge), np.sqrt(1 + np.add.outer(edge**2, edge**2)))
     solid_angle = corner[1:, 1:] - corner[:-1, 1:] - corner[1:, :-1] + corner[:-1, :-1]
-    v, u = np.meshgrid(centre, centre, indexing="ij")
+    v, u = np.meshgrid(center, center, indexing="ij")
     one = np.ones_like(u)
     faces = [
         (one, -v, -u),
@@ -76,11 +112,19 @@ def cube_map(resolution: int) -> Quadrature:
 
 
 def lat_long(height: int, width: int) -> Quadrature:
-    """Pixel centres of a lat-long picture, row by row, with weights exact below min(height, width).
+    """Make the quadrature of a lat-long picture: its pixel centers, row by row.
 
+    Weights are exact for polynomials of degrees below min(height, width).
     Row i is at θ = (i+½)π/height from +z, column j at φ = (j+½)2π/width from +x. With Fejér's
     weights the rows integrate polynomials in cos θ exactly. At 256 rows they differ from the
     pixels' solid angles by 13 % in the row at a pole and by under 2e-4 from the 20th row on.
+    Raises `ValueError` unless both are integers >= 1.
+
+    **Example**
+
+    >>> from jaxsh import sphere
+    >>> sphere.lat_long(4, 8).weights.shape
+    (32,)
     """
     theta = (np.arange(check_size("height", height)) + 0.5) * np.pi / height
     phi = (np.arange(check_size("width", width)) + 0.5) * 2 * np.pi / width
@@ -92,10 +136,10 @@ def lat_long(height: int, width: int) -> Quadrature:
 
 
 def fejer_weights(height: int) -> Float[np.ndarray, " height"]:
-    """∫ p(cos θ) sin θ dθ = Σ_i w_i p(cos θ_i) at θ_i = (i+½)π/height, for degrees below height.
+    """Weights of rows: ∫ p(cos θ) sin θ dθ = Σ_i w_i p(cos θ_i) for degrees below `height`.
 
-    Fejér's first rule: the integrals of the cosine series, 2/(1-4k²) for cos 2kθ, transformed
-    back to the nodes. All positive.
+    Fejér's first rule, at θ_i = (i+½)π/height: the integrals of the cosine series, 2/(1-4k²) for
+    cos 2kθ, transformed back to the nodes. All positive.
     """
     theta = (np.arange(height) + 0.5) * np.pi / height
     k = np.arange(1, (height - 1) // 2 + 1)
