@@ -40,16 +40,22 @@ def test_import_is_light():
     assert [name for name in runs[0]["added"] if name.startswith("jaxsh")] == ["jaxsh"]
 
 
-def test_the_lower_modules_load_without_readers_and_solvers():
-    added = measure("import jaxsh; jaxsh.sphere.lat_long; jaxsh.harmonics.evaluate")["added"]
-    assert {"jaxsh.harmonics", "jaxsh.sphere"} <= set(added)
-    assert not {"jaxsh.geometry", "jaxsh.imaging"} & set(added)
-    assert not top_level(added) & (HEAVY - {"equinox"})
-
-
-def test_the_stored_sky_needs_no_solver():
-    statement = "from jaxsh import sky; sky.preetham_harmonics([0.0, 0.0, 1.0], 3.0, 1)"
-    assert not top_level(measure(statement)["added"]) & (HEAVY - {"equinox"})
+def test_each_module_loads_only_what_it_needs():
+    # In one process, lowest first: what one has loaded the next finds loaded.
+    code = (
+        "import importlib\n"
+        "loaded = {}\n"
+        "names = 'harmonics', 'sphere', 'geometry', 'imaging', 'transfer', 'sky', 'adaptive'\n"
+        "for name in names:\n"
+        "    importlib.import_module('jaxsh.' + name)\n"
+        "    loaded[name] = {m.split('.')[0] for m in sys.modules}\n"
+        "assert not loaded['harmonics'] & HEAVY, loaded['harmonics'] & HEAVY\n"
+        "for name, added in loaded.items():\n"
+        "    assert added & HEAVY <= {'equinox'}, (name, added & HEAVY)"
+    )
+    added = measure(f"HEAVY = {HEAVY}\n{code}")["added"]
+    assert {"jaxsh.harmonics", "jaxsh.adaptive"} <= set(added)
+    assert not {"jaxsh.midrange", "jaxsh.inverse", "jaxsh.plot"} & set(added)
 
 
 def test_plots_choose_no_backend_and_load_no_window():

@@ -120,7 +120,7 @@ def test_light_refuses(light, message, unchecked):
 
 
 def test_lobes_stand_where_the_function_is_large():
-    ((up, down),) = [plot.lobes(np.array([[0, 0, 1.0, 0], [0, 0, -1.0, 0]]))]
+    ((up, down),) = [plot.lobes(np.array([[0, 0, 1.0, 0], [0, 0, -1.0, 0]]), resolution=20)]
     image = pixels(up.figure)
     for ax, above, below in ((up, ORANGE, BLUE), (down, BLUE, ORANGE)):
         left, right = (int(x) for x in ax.get_window_extent().intervalx)
@@ -136,7 +136,7 @@ def test_lobes_scale_with_the_function():
     # A constant is a ball: its silhouette a disc, with the radius |f| as a share of the largest.
     both = np.array([[1.0], [0.5]])
     for same, ratio in ((True, 0.5), (False, 1.0)):
-        axes = plot.lobes(both, same_scale=same)
+        axes = plot.lobes(both, same_scale=same, resolution=20)
         image = pixels(axes[0].figure)
         sizes = []
         for ax in axes:
