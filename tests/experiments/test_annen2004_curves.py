@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import trimesh
+from pictures import assert_picture
 
 from experiments.annen2004.irradiance import (
     interpolate_records,
@@ -62,8 +63,8 @@ def pick(rows, key, **wanted):
     return row[key]
 
 
-def assert_picture(folder, table, name):
-    assert (folder / name).stat().st_size > 5_000
+def assert_shown(folder, table, name):
+    assert_picture(folder / name, timed=name == "orders.png")
     assert f"({name})" in table
 
 
@@ -78,9 +79,10 @@ class TestFigure7:
         assert psnr["2³ grid, half gradient"] < psnr["2³ grid, half edge gradient"]
         assert [row["letter"] for row in rows if row["letter"]] == ["a", "b", "e", "f"]
         assert "| (a) < (b) < (f) |" in table
-        assert_picture(folder, table, "figure7.png")
+        assert_shown(folder, table, "figure7.png")
 
 
+@pytest.mark.slow
 class TestFigure8:
     def test_orders_fall_without_the_blocker_and_hardly_with_it(self, results):
         folder, table, rows = results("figure8")
@@ -91,7 +93,7 @@ class TestFigure8:
         hidden = [at(method=order, scene="with the blocker") for order in ORDERS]
         assert hidden[1] > 1.5 * free[1]
         assert hidden[3] > 0.8 * hidden[1]
-        assert_picture(folder, table, "figure8.png")
+        assert_shown(folder, table, "figure8.png")
 
     def test_the_gradient_of_edges_is_that_of_surfaces_where_nothing_hides(self, results):
         at = functools.partial(pick, results("figure8")[2], "error", distance=0.25)
@@ -124,7 +126,7 @@ class TestClaims:
         )
         assert psnr[none, 8, 4.0] + 9 < psnr[full, 8, 4.0]
         assert psnr["grid, no gradient", 8, 4.0] + 9 < psnr["grid, half gradient", 8, 4.0]
-        assert_picture(folder, table, "claims.png")
+        assert_shown(folder, table, "claims.png")
 
     def test_goals_stand_in_the_table(self, results):
         table = results("claims")[1]
@@ -152,7 +154,7 @@ class TestOrders:
         assert best["front exact"]
         assert fastest["front exact"]
         assert answer(rows) in table
-        assert_picture(folder, table, "orders.png")
+        assert_shown(folder, table, "orders.png")
 
     def test_the_front_and_the_answer(self):
         rows = [
@@ -169,6 +171,7 @@ class TestOrders:
         assert "order 1 1.50, order 2 9.00" in said
 
 
+@pytest.mark.slow
 class TestPlacement:
     def test_more_samples_are_better_wherever_they_are(self, results):
         folder, table, rows = results("placement")
@@ -176,7 +179,7 @@ class TestPlacement:
             one, four = (pick(rows, "psnr", method=method, samples=count) for count in (1, 4))
             assert one + 1 < four
         for name in ("placement.png", "frames.png", "animation.png"):
-            assert_picture(folder, table, name)
+            assert_shown(folder, table, name)
 
     def test_samples_come_and_go(self, results):
         frames = [row for row in results("placement")[2] if "frame" in row]
@@ -194,6 +197,7 @@ def light():
 
 
 class TestIrradianceGradients:
+    @pytest.mark.slow
     def test_against_autodiff(self, light, rng):
         """∇_t with the normal fixed; ∇_r as the normal turns by a small angle."""
         with jax.enable_x64(True):
@@ -230,6 +234,7 @@ class TestIrradianceGradients:
         assert chosen.max() < 50
 
 
+@pytest.mark.slow
 def test_expansions_by_autodiff_of_the_surface_are_those_of_the_boundary(rng):
     with jax.enable_x64(True):
         lights, point = three_lights(2.0, 1.0), jnp.asarray(rng.uniform(-0.4, 0.4, (1, 3)))

@@ -1,10 +1,10 @@
 """The first experiments on Annen et al. 2004 end to end on the embedded data, small."""
 
-import json
-
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import runs
+from pictures import assert_picture
 from PIL import Image
 
 from experiments.annen2004.figure1_5 import Figure15
@@ -13,7 +13,6 @@ from experiments.annen2004.figure6 import Figure6, _unfolded
 from experiments.annen2004.scenes import exact_expansion, psnr, three_lights
 from experiments.annen2004.table1 import Table1
 from experiments.runner import Context, Data
-from experiments.runner.cli import main
 from experiments.shared.lights import rectangle
 from experiments.shared.plots import Panel, draw_panels
 from experiments.shared.subjects import load
@@ -23,17 +22,14 @@ SMALL = ["--degree", "2", "--resolution", "16"]
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
-    def run(name, *options):
-        monkeypatch.delenv("JAXSH_DATA", raising=False)
-        out = ["--out", str(tmp_path), "--no-progress"]
-        assert main(["run", f"annen2004.{name}", *out, *SMALL, *options]) == 0
-        folder = tmp_path / f"annen2004.{name}" / "quick"
-        return folder, json.loads((folder / "metrics.json").read_text())
+def run(tmp_path):
+    def run(name, *options, small=False):
+        return runs.run(tmp_path, f"annen2004.{name}", *SMALL, *options, small=small)
 
     return run
 
 
+@pytest.mark.slow
 def test_table1(run):
     folder, rows = run("table1", "--frames", "1", "--directions", "16")
     [model], stages = rows[:1], rows[1:]
@@ -70,17 +66,17 @@ def test_three_lights_on_a_mesh(run):
         same = row["psnr_vertices"] + 20 * np.log10(row["relative"])
         first = rows[0]["psnr_vertices"] + 20 * np.log10(rows[0]["relative"])
         assert same == pytest.approx(first, abs=1e-3)
-    assert (folder / "knot.png").stat().st_size > 5_000
+    assert_picture(folder / "knot.png")
     assert "what the gradient gains" in (folder / "table.md").read_text()
 
 
 def test_moved_under_a_light(run):
     options = ["--directions", "16", "--size", "32", "--samples", "1", "--positions", "3"]
-    folder, rows = run("figure4", *options)
+    folder, rows = run("figure4", *options, small=True)
     assert [row["x"] for row in rows] == pytest.approx([-0.8, 0, 0.8])
     for row in rows:
         assert row["second order"] > row["with gradient"] > row["one sample"]
-    assert (folder / "figure4.png").stat().st_size > 5_000
+    assert_picture(folder / "figure4.png")
 
 
 @pytest.mark.slow
@@ -90,7 +86,7 @@ def test_incident_light_at_vertices(run):
         assert row["second order"] < row["with gradient"] < row["sample"]
         assert row["its own cube"] < row["with gradient"]
     assert rows[0]["with gradient"] < rows[1]["with gradient"]
-    assert (folder / "figure6.png").stat().st_size > 3_000
+    assert_picture(folder / "figure6.png")
 
 
 @pytest.mark.parametrize(

@@ -5,20 +5,17 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from pictures import assert_picture
+from runs import run
 
 from experiments.ramamoorthi2001.environment import direct_irradiance
-from experiments.runner.cli import main
 from jaxsh import sphere
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    out = tmp_path_factory.mktemp("results")
-    options = ["--out", str(out), "--degrees", "2", "6", "--size", "48", "--no-progress"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.delenv("JAXSH_DATA", raising=False)
-        assert main(["run", "environment", *options]) == 0
-    return out / "environment" / "quick"
+    options = ["--degrees", "2", "6", "--size", "48"]
+    return run(tmp_path_factory.mktemp("results"), "environment", *options, small=True)[0]
 
 
 def test_error_falls_with_degree(folder):
@@ -43,7 +40,7 @@ def test_windows_trade_error_for_negative_light(folder):
 def test_pictures_and_table(folder):
     table = (folder / "table.md").read_text()
     for picture in ("studio.png", "environments.png"):
-        assert (folder / picture).stat().st_size > 5_000
+        assert_picture(folder / picture)
         assert f"({picture})" in table
 
 

@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
+from pictures import assert_picture
+from runs import run
 
 from experiments.runner import Context, Data
-from experiments.runner.cli import main
 from experiments.sloan2002.reference import Pixels, Receivers, direct, one_bounce, turned
 from experiments.sloan2002.still import draw_still
 from jaxsh.geometry import make_mesh, ray_scene
@@ -28,10 +29,7 @@ SMALL = {
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("results")
     options = [word for name, values in SMALL.items() for word in (f"--{name}", *map(str, values))]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.delenv("JAXSH_DATA", raising=False)
-        assert main(["run", "first_light", *options, "--out", str(out), "--no-progress"]) == 0
-    return out / "first_light" / "quick"
+    return run(out, "first_light", *options, small=True)[0]
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +70,7 @@ def test_the_bake_is_measured(folder):
 def test_pictures_and_tables(folder):
     table = (folder / "table.md").read_text()
     for picture in ("first_light.png", "variants.png", "errors.png"):
-        assert (folder / picture).stat().st_size > 2_000
+        assert_picture(folder / picture)
         assert f"({picture})" in table
     for title in ("Goals", "Irradiance by degree", "Times", "Meshes"):
         assert f"## {title}\n" in table

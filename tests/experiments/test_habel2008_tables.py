@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from pictures import assert_picture
 
 from experiments.habel2008.cost import SAMPLES, verdict
 from experiments.habel2008.figure3 import smallest
@@ -50,6 +51,7 @@ def at(rows, **wanted):
     return row
 
 
+@pytest.mark.slow
 class TestFigure3:
     def test_ours_beats_plain_polynomials_of_equal_size_and_the_papers_claim(self, results):
         rows = results("figure3")[2]
@@ -94,7 +96,7 @@ class TestFigure3:
 
     def test_picture(self, results):
         folder, table, _ = results("figure3")
-        assert (folder / "figure3.png").stat().st_size > 20_000
+        assert_picture(folder / "figure3.png")
         assert "(figure3.png)" in table
 
     def test_without_data_the_authors_tables_are_left_out_and_said_to_be(self, results):
@@ -121,6 +123,7 @@ class TestSolvers:
         assert chebyshev["error_float32"] == pytest.approx(chebyshev["error"], rel=0.02)
         assert monomials["error_float32"] > 1e3 * monomials["error"]
 
+    @pytest.mark.slow
     def test_least_squares_in_one_step_and_gauss_newton_in_three(self, results):
         rows = results("solvers, one basis")[2]
         linear, newton = (
@@ -150,6 +153,7 @@ class TestCost:
         assert at(rows, what="the paper's, 4 bands, what gives its figure")["bytes"] == 28_672
         assert at(rows, what='ours, table "small", 7 bands')["bytes"] == 24_192
 
+    @pytest.mark.slow
     def test_errors_of_what_is_timed(self, results):
         error = {row["way"]: row["error"] for row in results("cost")[2] if "way" in row}
         assert error["ours, jitted"] == error["ours, called as it is"] < 0.0055
@@ -157,6 +161,7 @@ class TestCost:
         assert error["eq. 1 in NumPy, float64"] == pytest.approx(plain, rel=0.02)
         assert error["ours, jitted"] < plain < 0.37 < error[f"{SAMPLES:,} samples, jitted"] < 5
 
+    @pytest.mark.slow
     def test_times_are_positive_and_the_verdict_names_the_faster(self, results):
         _, table, rows = results("cost")
         timed = [row for row in rows if "way" in row]
@@ -178,6 +183,7 @@ def test_numpy_projection_is_ours():
     np.testing.assert_allclose(projection(views, weight, 6)(sun, 3.0), ours, rtol=1e-4, atol=2e-4)
 
 
+@pytest.mark.slow
 def test_rows_hold_the_packages_own_measure_and_fit():
     """`fit_error` and `habel2008_fit` beside what the experiment does faster in NumPy."""
     from experiments.habel2008.figure3 import Model, _errors, fitted

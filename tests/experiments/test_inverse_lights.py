@@ -1,40 +1,26 @@
 """The experiments on near lights recovered from shading, end to end and small."""
 
-import json
-
 import pytest
-
-from experiments.runner.cli import main
-
-
-@pytest.fixture
-def run(tmp_path, monkeypatch):
-    """An experiment's folder and rows, without a data folder."""
-    monkeypatch.delenv("JAXSH_DATA", raising=False)
-
-    def run(name, *options):
-        words = ["run", name, "--out", str(tmp_path), "--no-progress", *options]
-        assert main(words) == 0
-        folder = tmp_path / name / "quick"
-        return folder, json.loads((folder / "metrics.json").read_text())
-
-    return run
+from pictures import assert_picture
+from runs import run
 
 
 @pytest.mark.slow
-def test_emitters_are_recovered(run):
-    folder, (clean, noisy) = run("inverse.emitters", "--candidates", "8", "--height", "48")
+def test_emitters_are_recovered(tmp_path):
+    folder, (clean, noisy) = run(
+        tmp_path, "inverse.emitters", "--candidates", "8", "--height", "48"
+    )
     assert clean["converged"]
     assert noisy["converged"]
     for key in ("center", "size", "radiance"):
         assert max(clean[f"{key}_error"]) < 1e-5
         (error,), (expected,) = noisy[f"{key}_error"], noisy[f"{key}_deviation"]
         assert 0 < error < 4 * expected < 0.2
-    assert (folder / "recovered.png").stat().st_size > 10_000
+    assert_picture(folder / "recovered.png")
 
 
-def test_bounds_keep_the_light_that_is_off_from_going_negative(run):
-    _, rows = run("inverse.colors", "--repeats", "4", "--noise", "0.05")
+def test_bounds_keep_the_light_that_is_off_from_going_negative(tmp_path):
+    _, rows = run(tmp_path, "inverse.colors", "--repeats", "4", "--noise", "0.05", small=True)
     ours, free = (
         [row for row in rows if row["method"] == name] for name in ("ours (JAXopt)", "no bounds")
     )
