@@ -24,7 +24,7 @@ def thumbnail(path: Path) -> np.ndarray:
 
 
 def assert_picture(path: Path, *, timed: bool = False) -> None:
-    """The picture is what was stored for the file of this test, or not blank where it is `timed`."""
+    """Compare with what is stored; where the picture is of times, it must only show something."""
     found = thumbnail(path)
     with Image.open(path) as image:
         levels = np.asarray(image.convert("L"))

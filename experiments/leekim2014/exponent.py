@@ -18,6 +18,7 @@ from .methods import (
     seconds,
     truncations,
     warm,
+    worst_turns,
 )
 from .plots import draw_exponents
 from .scenes import One, Scene
@@ -58,6 +59,7 @@ def _rows(
     times = seconds(ways, lights(scene, config.frames))
     reference = first["full"]
     truncated = {name: scene.quality(first[name], reference) for name in lower}
+    turned = worst_turns(scene, ways["full"], adaptive)
     for method in adaptive:
         result, spent = first[method], times[method]
         line = {
@@ -71,4 +73,5 @@ def _rows(
         if "specular" in result.active_fraction:
             line["kept"] = float(np.ravel(np.asarray(result.active_fraction["specular"]))[-1])
         line |= scene.quality(color(result), reference).named()
+        line["psnr_turned"] = turned[method]
         yield line | rival(spent, times, truncated)

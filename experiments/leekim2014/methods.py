@@ -29,6 +29,7 @@ DIFFUSE, EIGHT_BITS = "diffuse", "diffuse, eight bits"
 _BURST = 3  # frames of one way, before the next takes its turn
 _TILE = 1024  # vertices of the product form's tiles
 TURN = 0.05  # of the light from frame to frame, in radians
+TURNS = 12  # of the light around the vertical, among which the worst error is sought
 
 Light = Float[Array, "3 k"]
 Way = Callable[[Light], Any]
@@ -111,6 +112,18 @@ def seconds(ways: Mapping[str, Way], lights: Iterable[Light]) -> dict[str, float
 def lights(scene: Scene, frames: int) -> list[Light]:
     """The scene's light, turning; its own direction is left to the errors."""
     return [scene.turned(TURN * (frame + 1)) for frame in range(frames)]
+
+
+def worst_turns(scene: Scene, full: Way, ways: Mapping[str, Way]) -> dict[str, float]:
+    """The least object PSNR of each way, in dB, while the light turns once around the vertical."""
+    worst = dict.fromkeys(ways, math.inf)
+    for angle in np.arange(TURNS) * 2 * np.pi / TURNS:
+        light = scene.turned(float(angle))
+        reference = full(light)
+        for name, way in ways.items():
+            quality = scene.quality(color(way(light)), reference)
+            worst[name] = min(worst[name], quality.object)
+    return worst
 
 
 def color(result: Any) -> Float[Array, "v 3"]:

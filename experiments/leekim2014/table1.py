@@ -26,6 +26,7 @@ from .methods import (
     still,
     truncations,
     warm,
+    worst_turns,
 )
 from .moving import moving
 from .scenes import PAPER, Row, Scene, Scenes, rows_or_default
@@ -117,6 +118,7 @@ def _scene(config: Table1, context: Context, scene: Scene) -> Iterator[dict[str,
         about["filtered_specular_mean"] = 1 - float(np.mean(np.asarray(kept["specular"])))
     yield about | _paper(scene.row)
     truncated = {name: quality[name] for name in lower}
+    turned = worst_turns(scene, ways["full"], adaptive)
     for method in adaptive:
         spent = times[method]
         line = where | {
@@ -127,6 +129,7 @@ def _scene(config: Table1, context: Context, scene: Scene) -> Iterator[dict[str,
         line |= {key: times[name] / spent for name, key in GAIN.items()}
         line["gain_eight_bits"] = lighter / spent
         line |= quality[method].named() | rival(spent, times, truncated)
+        line["psnr_turned"] = turned[method]
         paper = PAPER.get(scene.row)
         if paper and method in ("masks", "levels"):
             line["gain_paper"] = paper.gain

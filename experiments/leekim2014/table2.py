@@ -15,6 +15,7 @@ from .methods import (
     lights,
     seconds,
     warm,
+    worst_turns,
 )
 from .plots import draw_degrees
 from .scenes import One, Row, Scene
@@ -76,10 +77,11 @@ def _degree(config: Table2, context: Context, scene: Scene) -> Iterator[dict[str
     times = seconds(ways, lights(scene, config.frames))
     about = {"degree": degree, "coefficients": (degree + 1) ** 2}
     frames = about | {f"fps {name}": 1 / spent for name, spent in times.items()}
+    turned = worst_turns(scene, ways["full"], {name: ways[name] for name in config.methods})
     methods = []
     for method in config.methods:
         quality = scene.quality(color(first[method]), first["full"])
-        line = about | {"method": method} | quality.named()
+        line = about | {"method": method} | quality.named() | {"psnr_turned": turned[method]}
         line |= {f"gain {name}": times[name] / times[method] for name in _FULL}
         methods.append(line)
         frames[f"psnr {method}"] = quality.image

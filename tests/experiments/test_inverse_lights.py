@@ -7,9 +7,8 @@ from runs import run
 
 @pytest.mark.slow
 def test_emitters_are_recovered(tmp_path):
-    folder, (clean, noisy) = run(
-        tmp_path, "inverse.emitters", "--candidates", "8", "--height", "48"
-    )
+    options = ["--candidates", "8", "--height", "48"]
+    folder, (clean, noisy) = run(tmp_path, "inverse.emitters", *options)
     assert clean["converged"]
     assert noisy["converged"]
     for key in ("center", "size", "radiance"):
@@ -19,6 +18,7 @@ def test_emitters_are_recovered(tmp_path):
     assert_picture(folder / "recovered.png")
 
 
+@pytest.mark.slow
 def test_bounds_keep_the_light_that_is_off_from_going_negative(tmp_path):
     _, rows = run(tmp_path, "inverse.colors", "--repeats", "4", "--noise", "0.05", small=True)
     ours, free = (
