@@ -1,14 +1,16 @@
 """Tilings: vertices that mirror the eye into nearly the same direction share a tile."""
 
+import functools
 import heapq
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
 from ..transfer import Transfer
-from ..transfer._glossy_kernels import checked_eye, reflected, unit
+from ..transfer._glossy_kernels import checked_eye, mirrored, rows_of
 from ._method import check_known, check_one_device
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
@@ -67,8 +69,9 @@ def make_tiling(
     check_one_device("make_tiling", transfer)
     check_known("make_tiling", transfer, eye)
     eye = checked_eye(eye, transfer.positions.dtype)
-    axis = np.asarray(reflected(eye, transfer.positions, transfer.normals, distant), np.float32)
-    facing = np.sum(np.asarray(unit(transfer.normals.T)) * axis, axis=0)
+    axis, units = _mirrored(eye, transfer.positions, transfer.normals, distant)
+    axis = np.asarray(axis, np.float32)
+    facing = np.sum(np.asarray(units) * axis, axis=0)
     areas = vertex_areas(transfer) if areas is None else np.asarray(areas)
     weights = areas * (np.maximum(facing, 0) + 0.05)
     blocks, last = -(-len(weights) // block), len(weights) - 1
@@ -83,6 +86,13 @@ def make_tiling(
         jnp.asarray(np.repeat(np.arange(len(tiles), dtype=np.int32), sizes)),
         jnp.asarray(np.stack(axes), transfer.positions.dtype),
     )
+
+
+@functools.partial(jax.jit, static_argnames="distant")
+def _mirrored(eye, positions, normals, distant):
+    """Mirrors the eye about the normals, and returns these at unit length: one program for both."""
+    positions, normals = rows_of(positions, normals)
+    return mirrored(eye, positions, normals, distant), normals
 
 
 def _towards(vector: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:

@@ -10,18 +10,19 @@ from jaxsh.transfer import Material, quantize, sample, shade_diffuse, shade_glos
 
 @pytest.mark.parametrize(("quantized", "tolerance"), [(False, 1e-11), (True, 6e-3)])
 def test_every_method_at_its_finest_is_the_full_computation(rng, quantized, tolerance):
+    """`Masks` and `Levels` are so checked in `test_masks`."""
     light, made, eye, material = scene(rng)
+    light, made = light[:, :16], made.truncated(3)
     material = Material(material.diffuse, material.specular, 9.0)
     anchors = adaptive.make_anchors(made, share=0.2, quantized=quantized)
-    tiles = adaptive.make_tiles(made, eye, directions=500, quantized=quantized)
+    tiles = adaptive.make_tiles(
+        made, eye, num_tiles=3, block=16, directions=38, quantized=quantized
+    )
     methods = [
         adaptive.TwoStage(threshold=0.0),
         adaptive.Anchors(anchors, threshold=0.0),
         adaptive.Tiles(tiles),
     ]
-    if not quantized:
-        everyone = {"threshold": 0.0, "diffuse_threshold": 0.0}
-        methods += [adaptive.Masks(**everyone), adaptive.Levels(**everyone)]
     staged = adaptive.stage(made, quantized=quantized)
     full = shade_glossy(light, made, eye, material)
     for method in methods:
