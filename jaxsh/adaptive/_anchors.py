@@ -110,7 +110,7 @@ class AnchorSet(eqx.Module):
         light, eye, material = checked_frame(light, self.diffuse, eye, material)
         check_whole_degree("anchors", light, self.degree)
         check_one_exponent(material, self.num_points)
-        check_one_device("An AnchorSet", self)
+        check_one_device("An AnchorSet", self.rows.samples)
         limits = scalars(light.dtype, threshold=threshold, exposure=exposure)
         limits = limits["threshold"], limits["exposure"]
         return _shade_anchors(light, eye, material, self, limits, distant, normalized)

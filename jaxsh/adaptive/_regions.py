@@ -143,7 +143,7 @@ def smooth(
 ) -> Float[Array, "3 v"]:
     """Fades out what a region adds to the base, over two rings around it (figure 7).
 
-    In breadth-first order each vertex of a ring takes the mean over all its neighbours, so that
+    In breadth-first order each vertex of a ring takes the mean over all its neighbors, so that
     the second ring sees the first one's new values.
     """
     real = neighbors != jnp.arange(len(neighbors), dtype=neighbors.dtype)[:, None]

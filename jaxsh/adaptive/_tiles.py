@@ -118,7 +118,7 @@ class TileSet(eqx.Module):
         check_whole_degree("tiles", light, self.degree)
         eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
         check_one_exponent(material, count)
-        check_one_device("A TileSet", self)
+        check_one_device("A TileSet", self.samples)
         return _shade_tiles(light, eye, material, self, distant, normalized)
 
 

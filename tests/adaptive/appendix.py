@@ -62,7 +62,7 @@ def refine_roi(region, neighbors, joins, rings):
 
 
 def smooth_boundary(added, region, neighbors):
-    """Figure 7: in breadth-first order, two rings around the region take their neighbours' mean."""
+    """Figure 7: in breadth-first order, two rings around the region take their neighbors' mean."""
     added, inside = np.array(added), set(region)
     for _ in range(2):
         ring = sorted({n for v in inside for n in neighbors[v]} - inside)

@@ -16,7 +16,7 @@ EYE = np.array([0.5, -3.0, 2.0])
 
 
 def strip(rng, dtype="float64", count=V, degree=TARGET):
-    """Vertices in a row: each one's neighbours are the one before and the one behind."""
+    """Vertices in a row: each one's neighbors are the one before and the one behind."""
     decay = 1 / (1 + harmonics.degrees(degree)) ** 2
     rows = np.arange(count)[:, None]
     normals = rng.normal(size=(count, 3))

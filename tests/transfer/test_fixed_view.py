@@ -15,8 +15,8 @@ def materials(rng, kind, count):
     return {
         "numbers": MATERIAL,
         "a number for each vertex": Material(rng.uniform(size=(count, 1)), 0.7, exponents),
-        "one colour": Material(rng.uniform(size=3), 0.7, 12.0),
-        "colours": Material(0.4, rng.uniform(size=(count, 3)), exponents),
+        "one color": Material(rng.uniform(size=3), 0.7, 12.0),
+        "colors": Material(0.4, rng.uniform(size=(count, 3)), exponents),
     }[kind]
 
 
@@ -25,15 +25,15 @@ def materials(rng, kind, count):
     [
         ("numbers", np.float32, 5e-7, V, DEGREE, {}),
         ("a number for each vertex", np.float64, 2e-15, 1030, 1, {"normalized": False}),
-        ("one colour", np.float64, 2e-15, V, 0, {}),
-        ("colours", np.float64, 2e-15, V, DEGREE, {"distant": True}),
+        ("one color", np.float64, 2e-15, V, 0, {}),
+        ("colors", np.float64, 2e-15, V, DEGREE, {"distant": True}),
     ],
 )
 def test_a_light_s_product_is_glossy_shading(rng, kind, dtype, rtol, count, degree, options):
     made, material = surface(rng, dtype, count), materials(rng, kind, count)
     product = fixed_view(made, EYE, material, degree=degree, **options)
     assert product.degree == degree
-    assert product.coefficients.ndim == (3 if "colour" in kind else 2)
+    assert product.coefficients.ndim == (3 if "color" in kind else 2)
     lights = rng.normal(size=(2, 1, 3, (degree + 1) ** 2))
     exact = shade_glossy(lights[..., None, :, :], made, EYE, material, **options)
     for light, whole in ((lights, exact), (lights[1], exact[1]), (lights[0, 0], exact[0, 0])):
@@ -51,7 +51,7 @@ def test_fixed_views_have_the_transfer_s_degree_where_none_is_said(rng):
 
 
 def test_a_channel_that_is_no_number_stays_apart(rng):
-    product = fixed_view(surface(rng), EYE, materials(rng, "colours", V))
+    product = fixed_view(surface(rng), EYE, materials(rng, "colors", V))
     light = rng.normal(size=(3, K))
     broken = np.stack([light[0], np.full(K, np.nan), light[2]])
     np.testing.assert_array_equal(product(broken)[:, [0, 2]], product(light)[:, [0, 2]])
@@ -59,7 +59,7 @@ def test_a_channel_that_is_no_number_stays_apart(rng):
 
 def test_fixed_views_differentiate_as_glossy_shading(rng):
     """In light, transfer, eye and material, forward and reverse, by one program."""
-    made, material = surface(rng), materials(rng, "colours", V)
+    made, material = surface(rng), materials(rng, "colors", V)
     parts, neighbors = eqx.partition(made, eqx.is_inexact_array)
     at = jnp.asarray(rng.normal(size=(3, K))), parts, jnp.asarray(EYE), material
     along = jax.tree.map(lambda x: jnp.asarray(rng.normal(size=x.shape)), at)
