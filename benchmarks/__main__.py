@@ -50,6 +50,11 @@ _LAT_LONG = [
     Column("sphericart", "sphericart + matmul / separable", digits=1),
     Column("compile_s", "first call, s", digits=2),
 ]
+_FIRST_CALL = [
+    Column("call", "call"),
+    Column("cpu_s", "CPU, s", digits=2),
+    Column("wall_s", "wall, s", digits=2),
+]
 _ERRORS = [
     Column("degree", "degree"),
     Column("ours", "ours"),
@@ -82,7 +87,8 @@ class Options:
 
 def run(options: Options) -> Path:
     """Measure, and return the report's path."""
-    tables: dict[str, list[dict[str, Any]]] = {"basis": [], "lat_long": [], "errors": []}
+    names = "basis", "lat_long", "first_call", "errors"
+    tables: dict[str, list[dict[str, Any]]] = {name: [] for name in names}
     options.out.mkdir(parents=True, exist_ok=True)
     progress = tqdm(list(_requests(options)), "benchmarks", file=sys.stderr)
     for request in progress:
@@ -108,6 +114,10 @@ def run(options: Options) -> Path:
         "# Benchmarks\n",
         to_markdown(Table("Basis", _BASIS, note=layout), tables["basis"]),
         to_markdown(Table("Lat-long pictures, float32", _LAT_LONG), tables["lat_long"]),
+        to_markdown(
+            Table("First call: trace, compile and run, two rows, one core", _FIRST_CALL),
+            tables["first_call"],
+        ),
         to_markdown(Table("Largest float32 error", _ERRORS), tables["errors"]),
         f"```\npython -m benchmarks {' '.join(sys.argv[1:])}".rstrip() + "\n```\n",
         f"<sub>{' · '.join(facts)}</sub>\n",
@@ -133,6 +143,8 @@ def _requests(options: Options) -> Iterator[dict[str, Any]]:
     lat_long = {"table": "lat_long", "allocator": "keeping", "dtype": "float32", "degrees": [10]}
     for cores in options.cores:
         yield common | lat_long | {"cores": cores}
+    first_call = {"table": "first_call", "allocator": "default", "dtype": "float32"}
+    yield first_call | {"cores": "one", "rounds": 3, "degrees": [10]}
     errors = {"table": "errors", "allocator": "keeping", "dtype": "float32", "cores": "all"}
     yield common | errors | {"degrees": options.error_degrees}
 

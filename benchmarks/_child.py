@@ -14,7 +14,7 @@ def main(request: dict) -> None:
     import jax
     import numpy as np
 
-    from . import basis, lat_long
+    from . import basis, first_call, lat_long
 
     jax.config.update("jax_enable_x64", request["dtype"] == "float64")
     rounds = request["rounds"]
@@ -26,6 +26,9 @@ def main(request: dict) -> None:
         elif request["table"] == "lat_long":
             for row in lat_long.timings(degree, 256, rounds):
                 _emit(row | {"cores": request["cores"]})
+        elif request["table"] == "first_call":
+            for row in first_call.timings(rounds):
+                _emit(row)
         else:
             _emit(basis.errors(degree))
 

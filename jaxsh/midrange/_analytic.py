@@ -1,4 +1,4 @@
-"""Radiance cubes of a few polygons and spheres, in JAX alone."""
+"""Captures radiance cubes of a few polygons and spheres in JAX alone."""
 
 import functools
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ def capture_shapes(
     point: Float[Array, "*batch 3"],
     resolution: int,
 ) -> RadianceCube:
-    """Cubes of polygons and spheres before a sky, given by texel, in the dtype of the points."""
+    """Capture cubes of polygons and spheres before a sky, in the dtype of the points."""
     directions = tuple(texels(resolution).directions.astype(point.dtype).T)
     rows = tuple(jnp.asarray(sky, point.dtype).T)
     return _cubes(tuple(emitters), tuple(blockers), directions, rows, point)
@@ -106,7 +106,7 @@ def _see_polygon(
 
 
 def _inside(u: Float[Array, " v"], v: Float[Array, " v"], x: Array, y: Array) -> Array:
-    """Whether points lie in a simple polygon of corners (u, v): a ray along x leaves it oddly."""
+    """Tell which points lie in a simple polygon: a ray along x leaves it oddly."""
     inside = jnp.zeros(x.shape, bool)
     for i in range(len(u)):
         ahead = (u[i - 1] - u[i]) * (y - v[i]) - (v[i - 1] - v[i]) * (x - u[i])

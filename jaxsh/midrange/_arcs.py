@@ -27,7 +27,7 @@ class Arcs(NamedTuple):
 
     From `start` to `end`, vectors of any length, in the plane square to the unit vector `normal`,
     which points out of the region: the arcs go counter-clockwise around it, seen from the
-    sphere's centre, and clockwise around what is taken away from it. 1/r = near·ω for the light's
+    sphere's center, and clockwise around what is taken away from it. 1/r = near·ω for the light's
     or blocker's edge that lies behind ω; `near` is zero where the boundary is at rest on the
     sphere, not in space.
     """
@@ -211,7 +211,7 @@ def _nodes(count: int, span: _Spans) -> tuple[Float[Array, "3 count n"], Complex
 
 
 def _sloped_nodes(count: int, span: _Spans, slope: Float[Array, "3 n"]):
-    """`_nodes`, and the weights times slope·ω."""
+    """Place the nodes of `_nodes`, and weigh slope·ω at them too."""
     nodes, weights = _nodes(count, span)
     return nodes, weights, _times(weights, nodes, slope)
 

@@ -1,4 +1,4 @@
-"""Radiance cubes of a scene, by rays."""
+"""Captures radiance cubes of a scene, by rays."""
 
 import math
 import sys
@@ -59,7 +59,7 @@ def capture(
     >>> ball = midrange.Sphere(np.array([0.0, 0.0, 2.0]), np.array(0.5), np.ones(3))
     >>> cube = midrange.capture(midrange.Scene([ball]), np.zeros(3), 8, rays="analytic")
     >>> cube.radiance.shape, round(float(cube.distance.min()), 1)
-    ((384, 3), 1.5)
+    ((384, 3), 1.6)
     """
     resolution = check_size("resolution", resolution)
     point = as_float(point)
@@ -104,7 +104,7 @@ def _analytic(scene: Scene, point, resolution: int) -> RadianceCube:
 
 
 def _seen(scene: Scene, point: np.ndarray, directions: np.ndarray, resolution: int):
-    """Radiance, distance, offset and normal along each direction."""
+    """Trace radiance, distance, plane distance and normal along each direction."""
     sky = scene.sky(resolution)
     radiance, distance, offset, normal = _triangles(scene, point, directions, sky)
     for center, radius, light in zip(*scene.spheres, strict=True):
@@ -124,7 +124,7 @@ def _seen(scene: Scene, point: np.ndarray, directions: np.ndarray, resolution: i
 
 
 def _triangles(scene: Scene, point: np.ndarray, directions: np.ndarray, sky: np.ndarray):
-    """The same of the flat surfaces alone."""
+    """Trace the flat surfaces alone."""
     count = len(directions)
     if scene.rays is None:
         return sky.copy(), np.full(count, np.inf), np.full(count, -np.inf), np.zeros((count, 3))
@@ -156,7 +156,7 @@ def _triangles(scene: Scene, point: np.ndarray, directions: np.ndarray, sky: np.
 
 
 def _progress(places, total: int, wanted: bool):
-    """A bar on a terminal, of what takes longer than a second."""
+    """Show a bar on a terminal for captures longer than a second."""
     if not wanted or total < 2:
         return places
     from tqdm import tqdm

@@ -1,4 +1,4 @@
-"""What a point sees: a cube map of radiance, and of the planes that it comes from."""
+"""Radiance cubes: cube maps of radiance and of the planes that it comes from."""
 
 import math
 
@@ -12,13 +12,23 @@ from ..sphere import Quadrature, cube_map
 
 
 class RadianceCube(eqx.Module):
-    """The N = 6·resolution² texels of a cube map around `point`, in the order of `cube_map`.
+    """Holds the N = 6·resolution² texels of a cube map around `point`, in the order of `cube_map`.
 
     With s the way from the point to what a texel's center sees, its surface has the unit `normal`
     n, turned towards the point, the `distance` r = |s| and the signed `plane_distance` h = n·s < 0.
     A texel that sees nothing near has r = inf, h = -inf and n = 0; its radiance is that of the sky.
     The leading axes are those of the points. Each surface is taken to send the same radiance to
     all sides (Annen et al. 2004, §4).
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> cube = midrange.capture(midrange.Scene([light]), jnp.zeros(3), 8, rays="analytic")
+    >>> cube.resolution, cube.plane_distance.shape
+    (8, (384,))
     """
 
     radiance: Float[Array, "*batch n 3"] = eqx.field(converter=as_float)
@@ -49,7 +59,7 @@ class RadianceCube(eqx.Module):
 
     @property
     def directions(self) -> Float[Array, "n 3"]:
-        """Unit vectors ω through the texels' centres."""
+        """Unit vectors ω through the texels' centers."""
         return texels(self.resolution).directions.astype(self.distance.dtype)
 
     @property

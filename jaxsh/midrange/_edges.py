@@ -24,7 +24,7 @@ class Edges(NamedTuple):
     seams: Int[np.ndarray, "2 s"]  # texels on both sides of those between faces
     centers: Float[Array, "e 3"]  # unit
     normals: Float[Array, "e 3"]  # from the first texel to the second, as long as the edge
-    table: Float[Array, "k e"]  # the basis at the centres
+    table: Float[Array, "k e"]  # the basis at the centers
 
 
 def edge_gradient(cube: RadianceCube, edges: Edges) -> Float[Array, "3 k 3"]:
@@ -58,7 +58,7 @@ def edge_table(resolution: int, degree: int, dtype) -> Edges:
 
 
 def _edges(resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Seams, centres and normals, in float64."""
+    """Seams, centers and normals, in float64."""
     texel, corners = (
         np.arange(6 * resolution**2).reshape(6, resolution, resolution),
         _corners(resolution),

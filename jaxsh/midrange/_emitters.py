@@ -12,7 +12,7 @@ _FLAT = {np.dtype(np.float64): 1e-9, np.dtype(np.float32): 1e-5}
 
 
 class Polygon(eqx.Module):
-    """A flat, simple polygon of n >= 3 vertices that emits `radiance` from one side, or from both.
+    """Describes a flat, simple polygon that emits `radiance` from one side, or from both.
 
     The vertices (n, 3) run counter-clockwise seen from the side that emits; the polygon may be
     concave. `radiance` is linear RGB (3,), the same at every point and in every direction. As a
@@ -21,6 +21,15 @@ class Polygon(eqx.Module):
     Raises `ValueError` for shapes that do not fit and, where values are known, for numbers that
     are not finite, no area, vertices out of the plane (by more than 1e-9 of the extent, 1e-5
     below float64), and a boundary that meets itself.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> light.vertices.shape, light.two_sided
+    ((4, 3), False)
     """
 
     vertices: Float[Array, "n 3"] = eqx.field(converter=as_float)
@@ -40,14 +49,14 @@ class Polygon(eqx.Module):
 
 
 def is_convex(vertices: Float[np.ndarray, "n 3"]) -> bool:
-    """Whether no corner of a simple polygon turns inwards."""
+    """Tell if no corner of a simple polygon turns inwards."""
     edges = np.roll(vertices, -1, axis=0) - vertices
     turns = np.cross(edges, np.roll(edges, -1, axis=0)) @ area_vector(vertices)
     return bool((turns >= 0).all())
 
 
 def area_vector(vertices: np.ndarray) -> np.ndarray:
-    """The vector of the area, by Newell's formula."""
+    """Compute the area's vector, by Newell's formula."""
     spokes = vertices - vertices[0]
     return np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0) / 2
 
@@ -77,9 +86,9 @@ def _check_vertices(vertices: np.ndarray) -> None:
 
 
 def _meeting_edges(corners: Float[np.ndarray, "n 2"]) -> tuple[int, int] | None:
-    """Two edges, not neighbours, that have a point in common, if there are any.
+    """Find two edges, not neighbors, that have a point in common, if there are any.
 
-    So do edges of no length, with those beyond them; neighbours that fold back are found as the
+    So do edges of no length, with those beyond them; neighbors that fold back are found as the
     edges before or after them, or as no area.
     """
     ends = np.roll(corners, -1, axis=0)
@@ -100,10 +109,17 @@ def _meeting_edges(corners: Float[np.ndarray, "n 2"]) -> tuple[int, int] | None:
 
 
 class Sphere(eqx.Module):
-    """A sphere that emits `radiance` outwards, linear RGB (3,), the same everywhere.
+    """Describes a sphere that emits `radiance` outwards, linear RGB (3,), the same everywhere.
 
     Raises `ValueError` for shapes that do not fit and, where values are known, for numbers that
     are not finite and a radius that is not positive.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> midrange.Sphere(jnp.array([0.0, 0, 2]), jnp.array(0.5), jnp.ones(3)).center.shape
+    (3,)
     """
 
     center: Float[Array, " 3"] = eqx.field(converter=as_float)
@@ -122,10 +138,18 @@ class Sphere(eqx.Module):
 
 
 class EmissiveMesh(eqx.Module):
-    """A mesh whose faces emit `radiance` outwards, or to both sides.
+    """Describes a mesh whose faces emit `radiance` outwards, or to both sides.
 
     `radiance` is (3,), the same for all faces, or (F, 3). The front of a face is where its corners
     run counter-clockwise; a one-sided face is black from behind, and blocks.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import geometry, midrange
+    >>> lamp = midrange.EmissiveMesh(geometry.knot(300), jnp.ones(3))
+    >>> lamp.two_sided
+    False
     """
 
     mesh: Mesh

@@ -16,7 +16,7 @@ _ORDERS = {1: 0, 4: 1, 10: 2, 20: 3}  # by the number of monomials up to that or
 
 
 class Expansion(eqx.Module):
-    """The Taylor expansion of a light's coefficients around a point, channel by channel.
+    """Holds the Taylor expansion of a light's coefficients around a point, channel by channel.
 
     `terms` (..., 3, K, M) multiply the M monomials of the offset d = x - point: M = 1 (constant),
     4 (1, dx, dy, dz), 10 (and xx, xy, xz, yy, yz, zz) or 20 (and xxx, xxy, xxz, xyy, xyz, xzz,
@@ -24,6 +24,14 @@ class Expansion(eqx.Module):
     axes, if any, count points.
 
     Raises `ValueError` for shapes that do not fit.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> expansion = midrange.Expansion(jnp.zeros(3), jnp.ones((3, 4, 10)))
+    >>> expansion.order, expansion.degree, expansion.truncated(1).gradient.shape
+    (2, 1, (3, 4, 3))
     """
 
     point: Float[Array, "*batch 3"] = eqx.field(converter=as_float)
@@ -49,12 +57,12 @@ class Expansion(eqx.Module):
 
     @property
     def coefficients(self) -> Float[Array, "*batch 3 k"]:
-        """At the point itself."""
+        """Coefficients at the point itself."""
         return self.terms[..., 0]
 
     @property
     def gradient(self) -> Float[Array, "*batch 3 k 3"]:
-        """With respect to the receiver's position, at the point itself.
+        """Gradient by the receiver's position, at the point itself.
 
         Raises `ValueError` where the expansion is of order 0.
         """
@@ -78,7 +86,15 @@ def make_expansion(
     coefficients: Float[ArrayLike, "*batch 3 k"],
     gradient: Float[ArrayLike, "*batch 3 k 3"] | None = None,
 ) -> Expansion:
-    """The expansion of order 1 with these coefficients and gradient; of order 0 without one."""
+    """Make the expansion of order 1 with these coefficients and gradient; of order 0 without one.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> midrange.make_expansion(jnp.zeros(3), jnp.ones((3, 4)), jnp.ones((3, 4, 3))).order
+    1
+    """
     coefficients = as_float(coefficients)[..., None]
     if gradient is None:
         return Expansion(point, coefficients)
@@ -92,13 +108,21 @@ def make_expansion(
 
 
 def monomials(offsets: Float[Array, "*batch 3"], order: int) -> Float[Array, "*batch m"]:
-    """1, x, y, z, xx, xy, ... up to the order, in the order of `Expansion.terms`."""
+    """Compute 1, x, y, z, xx, xy, … up to an order, in the sequence of `Expansion.terms`.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> [round(float(m), 1) for m in midrange.monomials(jnp.array([1.0, 2.0, 3.0]), 1)]
+    [1.0, 1.0, 2.0, 3.0]
+    """
     x, y, z = offsets[..., 0], offsets[..., 1], offsets[..., 2]
     return jnp.stack(monomial_list((x, y, z), order), axis=-1)
 
 
 def monomial_list(offset: tuple[Array, Array, Array], order: int) -> list[Array]:
-    """The monomials one by one, each made from one of the order below and one component."""
+    """List the monomials, each made from one of the order below and one component."""
     made: dict[tuple[int, ...], Array] = {(): jnp.ones_like(offset[0])}
     for size in range(1, order + 1):
         for axes in itertools.combinations_with_replacement(range(3), size):
@@ -114,7 +138,7 @@ def term_orders(order: int) -> list[int]:
 def extrapolate(
     expansion: Expansion, positions: Float[ArrayLike, "*batch 3"]
 ) -> Float[Array, "*lights 3 k"]:
-    """The light's coefficients at the positions, from its Taylor expansion (eq. 14).
+    """Extrapolate a light's coefficients to positions by its Taylor expansion (eq. 14).
 
     Equation 14 is the expansion of order 1; the other orders, 0 to 3, go the same way.
 
@@ -129,6 +153,14 @@ def extrapolate(
     is for the caller to know: the error grows as the next power of offset / distance to the light.
 
     Raises `ValueError` for shapes that do not fit.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> expansion = midrange.make_expansion(jnp.zeros(3), jnp.ones((3, 4)), jnp.ones((3, 4, 3)))
+    >>> round(float(midrange.extrapolate(expansion, jnp.full(3, 0.5))[0, 0]), 1)
+    2.5
     """
     return _extrapolate(expansion, check_positions(positions).astype(expansion.terms.dtype))
 
@@ -144,7 +176,7 @@ def _extrapolate(expansion: Expansion, positions: Float[Array, "*batch 3"]) -> A
 
 
 def check_positions(positions: Float[ArrayLike, "*batch 3"]) -> Float[Array, "*batch 3"]:
-    """As a floating-point array; raises `ValueError` unless the last axis is x, y, z."""
+    """Convert to floating point; raises `ValueError` unless the last axis is x, y, z."""
     positions = as_float(positions)
     if positions.shape[-1:] != (3,):
         raise ValueError(f"expected positions (..., 3), got shape {positions.shape}")

@@ -21,13 +21,21 @@ _CORNERS = np.array(list(itertools.product((0, 1), repeat=3)), np.int32)
 
 
 class Grid(eqx.Module):
-    """Samples at even steps from `lower` to `upper`: the irradiance volume of Greger et al. 1998.
+    """Describes samples at even steps between two corners: Greger et al. 1998's irradiance volume.
 
     `shape` counts samples along x, y and z, at least two each. Samples are numbered with z
     fastest and x slowest.
 
     Raises `ValueError` for a shape that is not three such integers, and for bounds out of order
     where their values are known.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> grid = midrange.Grid(-jnp.ones(3), jnp.ones(3), (2, 2, 3))
+    >>> grid.size, grid.points.shape
+    (12, (12, 3))
     """
 
     lower: Float[Array, " 3"] = eqx.field(converter=as_float)
@@ -47,13 +55,13 @@ class Grid(eqx.Module):
 
     @property
     def points(self) -> Float[Array, "s 3"]:
-        """Where the samples are."""
+        """Positions of the samples."""
         steps = np.stack([i.ravel() for i in np.indices(self.shape)], axis=-1)
         share = jnp.asarray(steps / (np.array(self.shape) - 1), self.lower.dtype)
         return self.lower[None] * (1 - share) + self.upper[None] * share
 
     def weights(self, positions: Float[ArrayLike, "v 3"]) -> Weights:
-        """Trilinear weights of the eight samples around each position.
+        """Weigh the eight samples around each position trilinearly.
 
         They sum to one and reproduce linear functions, Σ w_j (x - p_j) = 0, so the rule "half"
         of `interpolate` fits. Outside the grid they are those of the nearest cell, carried on:
@@ -85,7 +93,7 @@ class Grid(eqx.Module):
 
     @property
     def size(self) -> int:
-        """How many samples there are."""
+        """Number of samples."""
         return math.prod(self.shape)
 
     def _samples(self) -> Int[np.ndarray, "c 8"]:
@@ -99,13 +107,21 @@ class Grid(eqx.Module):
 
 
 def grid_around(positions: Float[ArrayLike, "v 3"], shape: tuple[int, int, int]) -> Grid:
-    """The grid for an object with these positions: its box, drawn in to cos(π/2n) along each axis.
+    """Make a grid for an object: the box of its positions, drawn in to cos(π/2n) along each axis.
 
     n samples are so far apart as n roots of Chebyshev's polynomial: what is extrapolated at the
     border errs no more than what is interpolated, in one dimension. The whole box puts samples
     where there is no object, and nearer to the lights.
 
     Raises `ValueError` as `Grid` does: for one, where the box is flat.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> grid = midrange.grid_around(jnp.array([[-1.0, -1, -1], [1, 1, 1]]), (2, 2, 2))
+    >>> round(float(grid.upper[0]), 3)
+    0.707
     """
     positions = check_positions(positions)
     lower, upper = (bound(positions.reshape(-1, 3), axis=0) for bound in (jnp.min, jnp.max))

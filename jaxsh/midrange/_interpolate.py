@@ -26,7 +26,7 @@ def interpolate(
     *,
     rule: Rule = "full",
 ) -> Float[Array, "v 3 k"]:
-    """The light's coefficients at V positions: the weighted mean of what the samples say there.
+    """Interpolate a light's coefficients to V positions, as weighted means of expansions.
 
     **Arguments**
 
@@ -45,6 +45,16 @@ def interpolate(
     differentiable in all, forward and reverse. To shade with it, `shade` does both at once.
 
     Raises `ValueError` for shapes that do not fit and an unknown rule.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> points, positions = jnp.eye(3), jnp.full((5, 3), 0.4)
+    >>> samples = midrange.make_expansion(points, jnp.ones((3, 3, 4)))
+    >>> weights = midrange.inverse_distance_weights(positions, points)
+    >>> midrange.interpolate(samples, weights, positions).shape
+    (5, 3, 4)
     """
     positions = check_positions(positions).astype(expansions.terms.dtype)
     if positions.ndim != 2:
@@ -78,7 +88,7 @@ def _interpolate(expansions, weights, positions, rule):
 
 
 def rule_terms(expansions: Expansion, rule: Rule) -> Float[Array, "*batch 3 k m"]:
-    """The expansions' terms as the rule counts them; `interpolate` says why."""
+    """Scale the expansions' terms as the rule counts them; `interpolate` says why."""
     order = expansions.order
     if rule == "full":
         return expansions.terms
@@ -102,7 +112,7 @@ def check_weights(expansions: Expansion, weights: Weights, count: int) -> None:
 
 
 def take_rows(array: Float[Array, "v n"], rows: Array) -> Float[Array, "blocks size n"]:
-    """The rows of each block, zeros where it is not full."""
+    """Take the rows of each block, zeros where it is not full."""
     return array.at[rows].get(mode="fill", fill_value=0)
 
 

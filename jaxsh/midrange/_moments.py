@@ -23,7 +23,7 @@ Tables = tuple[Float[Array, "_ m"], ...]
 
 
 class _Parity(NamedTuple):
-    """Which y_lm a table holds."""
+    """Names the y_lm that a table holds."""
 
     axis: int
     rows: Int[np.ndarray, " rows"]

@@ -1,4 +1,4 @@
-"""Where to take samples, and samples that come and go as objects move."""
+"""Places samples, and adds and removes them as objects move."""
 
 import dataclasses
 import operator
@@ -33,7 +33,7 @@ def place_samples(
     candidates: int = 64,
     seed: int = 0,
 ) -> Float[np.ndarray, "s 3"]:
-    """Points for at most `count` samples of the light, for an object with these positions.
+    """Choose points for at most `count` samples of the light around an object.
 
     Annen et al. 2004 place samples "using Sloan et al.'s method", which is k-means, and leave
     how many and where else to future work.
@@ -56,10 +56,18 @@ def place_samples(
     - `seed`: of k-means and of the choice of probes.
 
     **Returns** the points (S, 3), NumPy, in the dtype of the positions. S = `count` but for
-    "greedy" with a target that fewer meet. Not differentiable.
+    "greedy" with a target that fewer meet. Runs on the host; not differentiable.
 
     Raises `ValueError` for shapes and options that do not fit, and for more samples than there
     are different positions.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import midrange
+    >>> positions = np.random.default_rng(0).normal(size=(50, 3))
+    >>> midrange.place_samples(positions, 4).shape
+    (4, 3)
     """
     positions = check_points(positions)
     distinct = len(np.unique(positions, axis=0))
@@ -114,7 +122,7 @@ def _farthest(positions: np.ndarray, count: int) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class Prediction:
-    """What each of n candidates says about each of Q probes, beside what is so there.
+    """Compares the light that n candidates predict at Q of the positions with the light there.
 
     All is irradiance: coefficients times λ_l, so that the sum of squares is the mean over all
     normals, but for a factor. `powers` are the weights of eq. 16 before they are divided by their
@@ -169,18 +177,18 @@ class Choice:
         self.error = float(prediction.error(self.chosen)[0]) if self.chosen else np.inf
 
     def add(self) -> bool:
-        """The candidate that helps most; false where none does."""
+        """Add the candidate that helps most; false where none does."""
         return self._improve(self.chosen)
 
     def exchange(self) -> None:
-        """One sample for another, while that helps."""
+        """Exchange one sample for another, while that helps."""
         while any(
             self._improve(self.chosen[:i] + self.chosen[i + 1 :]) for i in range(len(self.chosen))
         ):
             pass
 
     def remove(self, bound: float) -> bool:
-        """The sample that is missed least, if the error stays within the bound."""
+        """Remove the sample that is missed least, if the error stays within the bound."""
         without = [self.chosen[:i] + self.chosen[i + 1 :] for i in range(len(self.chosen))]
         errors = [float(self.prediction.error(rest)[0]) for rest in without if rest]
         if not errors or min(errors) > bound:
@@ -200,13 +208,13 @@ class Choice:
 
 
 def probes_of(positions: np.ndarray, count: int, seed: int) -> np.ndarray:
-    """Some of the positions, at random."""
+    """Draw some of the positions at random."""
     rows = np.random.default_rng(seed).permutation(len(positions))[:count]
     return positions[rows]
 
 
 def check_points(positions: Float[ArrayLike, "v 3"]) -> Float[np.ndarray, "v 3"]:
-    """As a NumPy array; raises `ValueError` unless (V, 3) with V >= 1 and finite."""
+    """Convert to NumPy; raises `ValueError` unless (V, 3) with V >= 1 and finite."""
     positions = np.asarray(positions)
     if positions.ndim != 2 or positions.shape[1] != 3 or len(positions) == 0:
         raise ValueError(f"expected positions (V, 3), V >= 1, got shape {positions.shape}")
@@ -224,10 +232,18 @@ def _irradiance(light) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class Update:
-    """What `update_samples` did: the samples now, those among them that are new, those gone.
+    """Reports the samples after `update_samples`: all of them, the new ones, those gone.
 
     `points` are those kept, in their order, and then the `added`. `removed` marks the samples
     given that are no longer used. `error` is the relative RMS error predicted with `points`.
+
+    **Example**
+
+    >>> import numpy as np
+    >>> from jaxsh import midrange
+    >>> update = midrange.Update(np.zeros((2, 3)), np.zeros((1, 3)), np.array([False]), 0.1)
+    >>> len(update.points), len(update.added)
+    (2, 1)
     """
 
     points: Float[np.ndarray, "s 3"]
@@ -249,7 +265,7 @@ def update_samples(
     probes: int = 128,
     seed: int = 0,
 ) -> Update:
-    """Adds samples where the error is above a target, or removes those that are not needed.
+    """Add samples where the error is above a target, or remove those that are not needed.
 
     One step of an animation: what Annen et al. 2004 leave to future work. Where the predicted
     error (as in `place_samples`, "greedy") is above `target`, candidates are added, the best
@@ -269,9 +285,25 @@ def update_samples(
     - `limit`: the most samples that may come of adding.
     - `exponent`, `probes`, `seed`: as for `place_samples`.
 
-    **Returns** an `Update`. One sample always stays. Not differentiable.
+    **Returns** an `Update`. One sample always stays. Runs on the host; not differentiable.
 
     Raises `ValueError` for shapes that do not fit, and a release not below the target.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> import numpy as np
+    >>> from jaxsh import midrange
+    >>> ball = midrange.Sphere(jnp.array([0.0, 0, 4]), jnp.array(0.5), jnp.ones(3))
+    >>> def evaluate(points):
+    ...     return midrange.make_expansion(points, midrange.sphere_harmonics(ball, points, 1))
+    >>> positions = np.random.default_rng(0).normal(size=(50, 3))
+    >>> candidates = midrange.place_samples(positions, 8)
+    >>> update = midrange.update_samples(
+    ...     candidates[:1], candidates, positions, evaluate, target=0.1, limit=3
+    ... )
+    >>> len(update.points), update.removed
+    (3, array([False]))
     """
     points, candidates, positions = map(check_points, (points, candidates, positions))
     release = target / 2 if release is None else release

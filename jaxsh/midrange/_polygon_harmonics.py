@@ -28,7 +28,7 @@ def polygon_harmonics(
     horizon: Float[ArrayLike, "*normals 3"] | None = None,
     blockers: Sequence[Polygon] = (),
 ) -> Float[Array, "*out 3 k"]:
-    """Coefficients ∫ L y_i dω of the light that reaches a point from a polygon, without error.
+    """Compute the coefficients ∫ L y_i dω of a polygon's light at a point, exactly.
 
     The integral over the polygon becomes one over the great-circle arcs of its boundary, exact
     for every degree and for arcs of every length (docs/near_light_polygons.md). Exact for what
@@ -53,8 +53,20 @@ def polygon_harmonics(
     with zero slope at points in the polygon's plane. At a point on an edge or vertex it is finite,
     but the light has no limit there; the slope grows as 1/distance towards it.
 
+    Receivers may be shared out between devices; corners and blockers are held by each.
+
     Raises `ValueError` for shapes that do not fit and, where values are known, for blockers that
     are not convex.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> c = midrange.polygon_harmonics(light, jnp.zeros(3), degree=1)
+    >>> c.shape, round(float(c[0, 0]), 3)
+    ((3, 4), 0.227)
     """
     return _light(polygon, point, degree, horizon, blockers, False)[0]
 
@@ -67,13 +79,23 @@ def polygon_harmonics_with_gradient(
     horizon: Float[ArrayLike, "*normals 3"] | None = None,
     blockers: Sequence[Polygon] = (),
 ) -> tuple[Float[Array, "*out 3 k"], Float[Array, "*out 3 k 3"]]:
-    """Coefficients as `polygon_harmonics` has them, and their gradient d/d point, together.
+    """Compute the coefficients of `polygon_harmonics` and their gradient d/d point, together.
 
     ∇c_i = -L Σ ∫ y_i m (1/r) dt over the boundary of what is seen, where r is the distance of the
     edge that bounds it, the polygon's or a blocker's; so, unlike eq. 8 of Annen et al. 2004, it
     has the motion of shadows in it. `horizon` is held fixed while the point moves.
 
     **Returns** (..., 3, K) and (..., 3, K, 3). All else as for `polygon_harmonics`.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> c, gradient = midrange.polygon_harmonics_with_gradient(light, jnp.zeros((5, 3)), degree=1)
+    >>> c.shape, gradient.shape
+    ((5, 3, 4), (5, 3, 4, 3))
     """
     return _light(polygon, point, degree, horizon, blockers, True)
 

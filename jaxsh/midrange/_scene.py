@@ -1,4 +1,4 @@
-"""Lights and what stands before them, ready to be traced."""
+"""Scenes: lights and their blockers, ready to be traced."""
 
 import functools
 import math
@@ -21,7 +21,7 @@ _MOST_SAMPLES = 16
 
 
 class Scene:
-    """Emitters, blockers and an environment around them all.
+    """Holds emitters, blockers and an environment around them all.
 
     Blockers are black, whatever radiance they carry. All block each other and the environment,
     from both sides: the back of a one-sided light is black, and so is a sphere from within.
@@ -30,6 +30,16 @@ class Scene:
 
     What is traced is built at the first capture and kept; the arrays are taken as they are then.
     Surfaces that coincide hide each other by chance: leave a gap.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> scene = midrange.Scene([light], [midrange.Polygon(corners / 2, jnp.zeros(3))])
+    >>> len(scene.emitters), len(scene.blockers)
+    (1, 1)
     """
 
     def __init__(
@@ -93,7 +103,7 @@ class Scene:
 
 
 def _texel_means(environment: Float[Array, "h w 3"], resolution: int) -> Float[np.ndarray, "n 3"]:
-    """By n × n samples in a texel, bilinear each, about two to a pixel where pixels are small."""
+    """Average n × n bilinear samples in a texel, about two to a pixel where pixels are small."""
     n = min(max(1, math.ceil(environment.shape[0] / resolution)), _MOST_SAMPLES)
     fine, cells = cube_map(resolution * n), (6, resolution, n, resolution, n)
     seen = look_up(environment, fine.directions.astype(environment.dtype))

@@ -23,7 +23,7 @@ def shade(
     weights: Weights | None = None,
     rule: Rule = "full",
 ) -> Float[Array, "v 3"]:
-    """Radiance that leaves each of V diffuse vertices near emitters (eqs. 3, 14 and 15).
+    """Compute the radiance that leaves V diffuse vertices near emitters (eqs. 3, 14 and 15).
 
     What `shade_diffuse` makes of `extrapolate` (one sample) or `interpolate` (many), in another
     order: the transfer is multiplied with all terms of the expansions first, T · [c, ∇c], and
@@ -45,6 +45,16 @@ def shade(
     weights and albedo; differentiable in all and in positions and points, forward and reverse.
 
     Raises `ValueError` for shapes that do not fit and an unknown rule.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange, transfer
+    >>> positions, normals = jnp.zeros((2, 3)), jnp.array([[0.0, 0, 1], [1, 0, 0]])
+    >>> receivers = transfer.unshadowed(positions, normals, degree=1)
+    >>> light = midrange.make_expansion(jnp.zeros(3), jnp.ones((3, 4)), jnp.ones((3, 4, 3)))
+    >>> midrange.shade(light, receivers, 0.5).shape
+    (2, 3)
     """
     albedo, count = as_float(albedo), len(transfer.coefficients)
     if weights is None and (expansions.point.ndim != 1 or rule == "half"):

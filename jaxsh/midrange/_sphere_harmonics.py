@@ -15,7 +15,7 @@ from ._emitters import Sphere
 def sphere_harmonics(
     sphere: Sphere, point: Float[ArrayLike, "*batch 3"], degree: int
 ) -> Float[Array, "*batch 3 k"]:
-    """Coefficients ∫ L y_i dω of the light that reaches a point from a sphere.
+    """Compute the coefficients ∫ L y_i dω of a sphere's light at a point, exactly.
 
     It is seen as a cap around ω = s/d, s = center - point, with z = cos α = √(1 - R²/d²). By the
     theorem of Funk and Hecke c_lm = L b_l y_lm(ω), where b_l = 2π ∫_z^1 P_l, which is
@@ -27,6 +27,15 @@ def sphere_harmonics(
 
     Raises `ValueError` for shapes that do not fit and, where values are known, for a point inside
     the sphere; where they are not known, such a point gives NaN.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> ball = midrange.Sphere(jnp.array([0.0, 0, 2]), jnp.array(0.5), jnp.ones(3))
+    >>> c = midrange.sphere_harmonics(ball, jnp.zeros(3), degree=1)
+    >>> c.shape, round(float(c[0, 0]), 3)
+    ((3, 4), 0.056)
     """
     return _light(sphere, point, degree, False)[0]
 
@@ -34,10 +43,19 @@ def sphere_harmonics(
 def sphere_harmonics_with_gradient(
     sphere: Sphere, point: Float[ArrayLike, "*batch 3"], degree: int
 ) -> tuple[Float[Array, "*batch 3 k"], Float[Array, "*batch 3 k 3"]]:
-    """Coefficients as `sphere_harmonics` has them, and their gradient d/d point, together.
+    """Compute the coefficients of `sphere_harmonics` and their gradient d/d point, together.
 
     ∇c = L (y ∇b_l - b_l ∇_s y), where ∇b_l = 2π P_l(z) R²/(d³ z) ω. Returns (..., 3, K) and
     (..., 3, K, 3).
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> ball = midrange.Sphere(jnp.array([0.0, 0, 2]), jnp.array(0.5), jnp.ones(3))
+    >>> c, gradient = midrange.sphere_harmonics_with_gradient(ball, jnp.zeros(3), degree=1)
+    >>> c.shape, gradient.shape
+    ((3, 4), (3, 4, 3))
     """
     return _light(sphere, point, degree, True)
 

@@ -23,9 +23,17 @@ from ._surfaces import Emitter, spheres, triangles
 
 
 class SurfaceSamples(eqx.Module):
-    """n points on emitters, with unit normals, areas and what leaves on the normal's side.
+    """Holds n points on emitters: unit normals, areas, and the radiance on the normal's side.
 
     Both sides of a two-sided emitter are samples of their own.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> up = jnp.array([[0.0, 0, -1]])
+    >>> midrange.SurfaceSamples(-2 * up, up, jnp.ones(1), jnp.ones((1, 3))).areas.shape
+    (1,)
     """
 
     points: Float[Array, "n 3"] = eqx.field(converter=as_float)
@@ -41,11 +49,21 @@ class SurfaceSamples(eqx.Module):
 
 
 def surface_samples(emitters: Sequence[Emitter], count: int) -> SurfaceSamples:
-    """Samples of emitters: `count` on each sphere and, or a few more, on each triangle.
+    """Sample emitters: `count` points on each sphere and, or a few more, on each triangle.
 
     On triangles by products of Gauss–Legendre nodes, m² for the least m² >= count: what is
     integrated is smooth, and the error falls exponentially in m where the point is off the
     surface. On spheres evenly. In JAX's default float. Raises `ValueError` where there is none.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> samples = midrange.surface_samples([light], 4)
+    >>> samples.points.shape, round(float(samples.areas.sum()), 3)
+    ((8, 3), 4.0)
     """
     m = math.isqrt(check_size("count", count) - 1) + 1
     nodes, weights = np.polynomial.legendre.leggauss(m)
@@ -75,11 +93,22 @@ def surface_samples(emitters: Sequence[Emitter], count: int) -> SurfaceSamples:
 def project_surface(
     samples: SurfaceSamples, point: Float[ArrayLike, "*batch 3"], degree: int
 ) -> Float[Array, "*batch 3 k"]:
-    """Coefficients Σ y_i(s/|s|) g L A over samples of emitters that nothing hides (eqs. 6 and 7).
+    """Sum coefficients Σ y_i(s/|s|) g L A over samples of emitters that nothing hides (eqs. 6, 7).
 
     Eq. 7 lacks a minus: n·s < 0 where the emitter faces the point; other samples give nothing.
     Returns (..., 3, K) in the samples' dtype. Differentiable in points and samples. A point on a
     sample has no coefficients. Raises `ValueError` for wrong shapes.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> samples = midrange.surface_samples([light], 16)
+    >>> c = midrange.project_surface(samples, jnp.zeros(3), degree=1)
+    >>> c.shape, round(float(c[0, 0]), 3)
+    ((3, 4), 0.227)
     """
     return _at_points(_project, samples, point, check_degree(degree))
 
@@ -87,9 +116,20 @@ def project_surface(
 def project_surface_with_gradient(
     samples: SurfaceSamples, point: Float[ArrayLike, "*batch 3"], degree: int
 ) -> tuple[Float[Array, "*batch 3 k"], Float[Array, "*batch 3 k 3"]]:
-    """Coefficients and d/d point, -Σ (∇y g + y ∇g) L A with ∇ = d/ds (eqs. 10 to 12).
+    """Sum coefficients and d/d point, -Σ (∇y g + y ∇g) L A with ∇ = d/ds (eqs. 10 to 12).
 
     With the sign of eq. 9 goes that of eq. 12: ∇g = -n/|s|³ + 3 s (n·s)/|s|⁵. ∇y is d/ds y(s/|s|).
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> samples = midrange.surface_samples([light], 16)
+    >>> c, gradient = midrange.project_surface_with_gradient(samples, jnp.zeros(3), degree=1)
+    >>> c.shape, gradient.shape
+    ((3, 4), (3, 4, 3))
     """
     return _at_points(_project_with_gradient, samples, point, check_degree(degree))
 
@@ -124,7 +164,7 @@ def _project_with_gradient(samples: SurfaceSamples, point: Float[Array, " 3"], d
     power = samples.areas[:, None] * samples.radiance
     light = g[:, None] * power
     moved = power[:, :, None] * slope_of_g[:, None, :]
-    gradient = jnp.moveaxis(matmul(slope, light[None]), 0, -1)  # K, 3 colours, 3 axes
+    gradient = jnp.moveaxis(matmul(slope, light[None]), 0, -1)  # K, 3 colors, 3 axes
     gradient += matmul(basis, moved.reshape(-1, 9)).reshape(-1, 3, 3)
     return matmul(basis, light).T, -jnp.moveaxis(gradient, 0, 1)
 

@@ -32,7 +32,7 @@ class Spheres(NamedTuple):
 
 
 def triangles(emitters: Sequence[Emitter], blockers: Sequence[Blocker] = ()) -> Triangles:
-    """Those of all polygons and meshes; the ones without area are left out."""
+    """List the triangles of all polygons and meshes; those without area are left out."""
     corners, front, back = [np.zeros((0, 3, 3))], [np.zeros((0, 3))], [np.zeros((0, 3))]
     for surface, shines in _with_light(emitters, blockers):
         if isinstance(surface, Sphere):
@@ -60,7 +60,7 @@ def triangles(emitters: Sequence[Emitter], blockers: Sequence[Blocker] = ()) -> 
 
 
 def spheres(emitters: Sequence[Emitter], blockers: Sequence[Blocker] = ()) -> Spheres:
-    """Those among the surfaces."""
+    """List the spheres among the surfaces."""
     found = [
         (surface.center, surface.radius, surface.radiance if shines else np.zeros(3))
         for surface, shines in _with_light(emitters, blockers)
@@ -96,7 +96,7 @@ def triangulate(vertices: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, "t 3"]:
 
 
 def _is_ear(corners: Float[np.ndarray, "n 3"], i: int, normal: Float[np.ndarray, " 3"]) -> bool:
-    """Whether the corner i is convex and its triangle holds no other corner."""
+    """Tell if the corner i is convex and its triangle holds no other corner."""
     a, b, c = corners[i - 1], corners[i], corners[(i + 1) % len(corners)]
     others = np.array([p for p in corners if not any(np.array_equal(p, q) for q in (a, b, c))])
     others = others.reshape(-1, 3)

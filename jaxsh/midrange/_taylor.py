@@ -31,7 +31,7 @@ _ORDERS = range(4)
 
 
 def taylor(cube: RadianceCube, degree: int, order: int) -> Expansion:
-    """Coefficients of a cube's light around its point, to `order` 0, 1, 2 or 3 in the offset.
+    """Expand a cube's light around its point, to `order` 0, 1, 2 or 3 in the offset.
 
     Exact derivatives of Σ_t L dω (1 - n·d/h) y(ω′)(r/r′)³, what the texels' patches of surface send
     to the point p + d, visibility unchanged: the paper's open question of §8. Order 1 is
@@ -43,6 +43,17 @@ def taylor(cube: RadianceCube, degree: int, order: int) -> Expansion:
     **Returns** an `Expansion`, terms (..., 3, K, M) in the cube's dtype, linear in the radiance,
     differentiable in radiance, distance, offset and normal. Texels at infinity, or whose plane is
     seen edge on, add to order 0 only. Raises `ValueError` for a wrong degree or order.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> cube = midrange.capture(midrange.Scene([light]), jnp.zeros(3), 8, rays="analytic")
+    >>> expansion = midrange.taylor(cube, degree=1, order=2)
+    >>> expansion.order, expansion.terms.shape
+    (2, (3, 4, 10))
     """
     if order not in _ORDERS:
         raise ValueError(f"order must be 0, 1, 2 or 3, got {order!r}")
@@ -51,11 +62,21 @@ def taylor(cube: RadianceCube, degree: int, order: int) -> Expansion:
 
 
 def project_cube(cube: RadianceCube, degree: int) -> Float[Array, "*batch 3 k"]:
-    """Coefficients ∫ L(ω) y_i(ω) dω of a cube's radiance (eq. 5): (..., 3, K).
+    """Project a cube's radiance to coefficients ∫ L(ω) y_i(ω) dω (eq. 5): (..., 3, K).
 
-    With exact solid angles of the texels and y at their centres: a constant cube is exact in l = 0,
+    With exact solid angles of the texels and y at their centers: a constant cube is exact in l = 0,
     any other to the order of resolution^-1 along edges of lights. Linear and differentiable in the
     radiance. Raises `ValueError` for a wrong degree.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> cube = midrange.capture(midrange.Scene([light]), jnp.zeros(3), 8, rays="analytic")
+    >>> midrange.project_cube(cube, degree=1).shape
+    (3, 4)
     """
     return taylor(cube, degree, 0).coefficients
 
@@ -101,7 +122,7 @@ def _terms(cube, tables, degree: int, order: int) -> Float[Array, "3 k m"]:
 
 
 def _columns(cube: RadianceCube, order: int) -> Float[Array, "n c"]:
-    """L, then for k = 1, 2, …: L/r^k, and L q/r^(k-1) for each colour and axis; zeros up to 8s."""
+    """L, then for k = 1, 2, …: L/r^k, and L q/r^(k-1) for each color and axis; zeros up to 8s."""
     radiance = cube.radiance
     columns = [radiance]
     if order:
@@ -117,7 +138,15 @@ def _columns(cube: RadianceCube, order: int) -> Float[Array, "n c"]:
 
 
 def monomials(order: int) -> list[tuple[int, ...]]:
-    """Those of one order, as sorted axes: xx, xy, xz, yy, yz, zz are (0, 0), (0, 1), …"""
+    """List those of one order, as sorted axes: xx, xy, xz, yy, yz, zz are (0, 0), (0, 1), …
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> [round(float(m), 1) for m in midrange.monomials(jnp.array([1.0, 2.0, 3.0]), 1)]
+    [1.0, 1.0, 2.0, 3.0]
+    """
     return list(itertools.combinations_with_replacement(range(3), order))
 
 
@@ -157,7 +186,7 @@ def taylor_matrices(degree: int, order: int) -> Float[np.ndarray, "m k k_up"]:
 def project_cube_with_gradient(
     cube: RadianceCube, degree: int, *, gradient: str = "surface"
 ) -> tuple[Float[Array, "*batch 3 k"], Float[Array, "*batch 3 k 3"]]:
-    """Coefficients (..., 3, K) of a cube's light, and d/d point of them, (..., 3, K, 3).
+    """Project a cube to coefficients (..., 3, K) and their gradient d/d point, (..., 3, K, 3).
 
     With ω a texel's direction, dω its solid angle, t the tangential gradient of y at ω:
 
@@ -171,6 +200,17 @@ def project_cube_with_gradient(
     Linear in the radiance; differentiable in all of the cube, in `"edges"` with kinks where the
     nearer of two surfaces changes. Zero from texels at infinity, and from planes seen edge on.
     Raises `ValueError` for a wrong degree or an unknown `gradient`.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
+    >>> light = midrange.Polygon(corners, jnp.ones(3))
+    >>> cube = midrange.capture(midrange.Scene([light]), jnp.zeros(3), 8, rays="analytic")
+    >>> c, gradient = midrange.project_cube_with_gradient(cube, degree=1, gradient="edges")
+    >>> c.shape, gradient.shape
+    ((3, 4), (3, 4, 3))
     """
     if gradient == "surface":
         expansion = taylor(cube, degree, 1)

@@ -44,5 +44,5 @@ Components = tuple[Array, Array, Array]
 
 
 def component_dot(a: Components, b: Components) -> Array:
-    """Of vectors as three arrays x, y and z, of any shape."""
+    """Multiply vectors given as three arrays x, y and z, of any shape."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -20,7 +20,7 @@ class Scene(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What is known at trace time. Clips need convex loops; a whole outline may be concave."""
+    """Facts known at trace time. Clips need convex loops; a whole outline may be concave."""
 
     degree: int
     gradient: bool
@@ -89,7 +89,7 @@ def _outline(corners: Float[Array, "loops m 3"], point: Float[Array, "3 n"]) -> 
 
 
 def _normal(vertices: Float[Array, "n 3"]) -> Float[Array, " 3"]:
-    """Of the length of twice the area, by Newell's formula."""
+    """Normal of the length of twice the area, by Newell's formula."""
     spokes = vertices - vertices[:1]
     return jnp.cross(spokes, jnp.roll(spokes, -1, axis=0)).sum(axis=0)
 

@@ -1,4 +1,4 @@
-"""How much each of S samples counts at each of V positions."""
+"""Weights of S samples at V positions."""
 
 import functools
 import math
@@ -17,7 +17,7 @@ Rows = tuple[Array, Array, Array]
 
 
 class Cells(eqx.Module):
-    """V positions by the cell in which they lie, where all positions of a cell share N samples.
+    """Sorts V positions by the cell in which they lie, where all of a cell share N samples.
 
     `samples` are those of each of C cells, out of `count`. For work block by block, `rows` lists
     positions of one cell per block and V where a block is not full, and `place` is where each
@@ -32,9 +32,16 @@ class Cells(eqx.Module):
 
 
 class Weights(eqx.Module):
-    """Weights of samples at V positions: dense, or N of them each for the samples of a cell.
+    """Holds weights of samples at V positions: all of them, or those of the N of a cell.
 
     `values` (V, S) where `cells` is `None`, else (V, N). Differentiable in `values`.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> midrange.Weights(jnp.full((5, 2), 0.5)).samples
+    2
     """
 
     values: Float[Array, "v n"]
@@ -42,7 +49,7 @@ class Weights(eqx.Module):
 
     @property
     def samples(self) -> int:
-        """How many samples they weigh: S."""
+        """Number of samples that they weigh: S."""
         return self.values.shape[1] if self.cells is None else self.cells.count
 
     @property
@@ -57,7 +64,7 @@ def inverse_distance_weights(
     *,
     exponent: float = 4.0,
 ) -> Weights:
-    """Shepard's weights: distance to the power -b, divided by their sum (eq. 16).
+    """Compute Shepard's weights: distance to the power -b, divided by their sum (eq. 16).
 
     **Arguments**
 
@@ -73,6 +80,15 @@ def inverse_distance_weights(
     No power is taken of a number above one, so float32 holds any exponent.
 
     Raises `ValueError` for shapes that do not fit and an exponent that is not positive.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> points = jnp.array([[0.0, 0, 0], [3, 0, 0]])
+    >>> weights = midrange.inverse_distance_weights(jnp.array([[1.0, 0, 0]]), points, exponent=2)
+    >>> [round(float(w), 2) for w in weights.values[0]]
+    [0.8, 0.2]
     """
     positions, points = _check_places(positions, points)
     return Weights(_shepard(positions, points, _check_exponent(exponent) / 2))
@@ -96,7 +112,7 @@ def moving_least_squares_weights(
     *,
     exponent: float = 2.0,
 ) -> Weights:
-    """Shepard's weights, corrected so that they reproduce linear functions.
+    """Compute Shepard's weights, corrected so that they reproduce linear functions.
 
     Σ w_j = 1 and Σ w_j (x - p_j) = 0, as the rule "half" of `interpolate` asks for. They are the
     weights nearest to Shepard's u that have this: Σ (w_j - u_j)²/u_j is least. The plane fitted
@@ -113,6 +129,15 @@ def moving_least_squares_weights(
     worse, and beyond 4 float32 shows it. Weights may be negative, and grow with the distance
     outside the samples' hull. Differentiable in positions and points, forward and reverse, at a
     sample's point too; whether points lie in a plane is taken as given.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import midrange
+    >>> points = jnp.array([[0.0, 0, 0], [3, 0, 0]])
+    >>> weights = midrange.moving_least_squares_weights(jnp.array([[1.0, 0, 0]]), points)
+    >>> [round(float(w), 2) for w in weights.values[0]]
+    [0.67, 0.33]
     """
     positions, points = _check_places(positions, points)
     return Weights(_least_squares(positions, points, _check_exponent(exponent) / 2))
@@ -126,7 +151,7 @@ def _least_squares(
     squared = _squared_length(offsets)
     nearest = _nearest(squared)
     # Around the nearest sample, f_j = p_j - p_near and e_j = f_j + e_near, nothing cancels: its
-    # neighbours have shares v of their common weight s, which vanishes towards the sample, and
+    # neighbors have shares v of their common weight s, which vanishes towards the sample, and
     # C = s Ĉ. So w_j = v_j (s - (f_j - s f̄) · Ĉ⁺ m), m = s f̄ + e_near, and Ĉ stays as it is.
     others = _powers(squared, nearest, half)
     s = _total(others) / (1 + _total(others))
@@ -152,7 +177,7 @@ def _least_squares(
 
 
 def _check_places(positions, points) -> tuple[Float[Array, "v 3"], Float[Array, "s 3"]]:
-    """Both in the dtype of the positions."""
+    """Check both, and cast them to the dtype of the positions."""
     positions, points = check_positions(positions), as_float(points)
     if positions.ndim != 2 or points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
         raise ValueError(
@@ -169,7 +194,7 @@ def _offsets(positions: Float[Array, "v 3"], points: Float[Array, "s 3"]) -> Row
 
 
 def _nearest(squared: Float[Array, "s v"]) -> Bool[Array, "s v"]:
-    """Where the least distance is, one for each position."""
+    """Mark the least distance, one for each position."""
     which = jnp.arange(len(squared), dtype=jnp.int32)[:, None]
     return which == jnp.argmin(squared, axis=0).astype(jnp.int32)[None]
 
