@@ -65,11 +65,12 @@ check: $(VENV)/installed
 	$(bin)/basedpyright --pythonpath $(bin)/python
 
 docs: $(VENV)/installed
-	$(bin)/mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 $(bin)/mkdocs build --strict
 
 package: $(VENV)/installed
-	$(bin)/python -m pip install --quiet build
+	rm -rf dist
 	$(bin)/python -m build
+	$(bin)/python tools/check_package.py dist
 
 bench: $(BENCH_VENV)/installed
 	$(BENCH_VENV)/bin/python -m benchmarks

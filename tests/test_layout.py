@@ -3,6 +3,7 @@
 import ast
 import importlib
 import inspect
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -88,6 +89,20 @@ def test_the_reader_of_imports_reads_all_forms():
 def test_every_module_has_a_floor():
     assert set(FLOORS) == {path.parent.name for path in (ROOT / "jaxsh").glob("*/__init__.py")}
     assert set(FLOORS) - {"_core"} == set(jaxsh.__all__)
+
+
+def test_versions_agree():
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+    assert jaxsh.__version__ == declared
+    assert f"\nversion: {declared}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"\n## {declared}" in (ROOT / "CHANGELOG.md").read_text("utf-8")
+
+
+def test_each_module_has_its_page():
+    navigation = (ROOT / "mkdocs.yml").read_text("utf-8")
+    for module in jaxsh.__all__:
+        assert f"::: jaxsh.{module}" in (ROOT / f"docs/api/{module}.md").read_text("utf-8")
+        assert f"{module}: api/{module}.md" in navigation
 
 
 def test_private_files_are_imported_through_doors_only():
