@@ -6,6 +6,9 @@ python -m experiments list
 python -m experiments run NAME... [options] [overrides]
     run them and write results/NAME/PRESET/
 
+python -m experiments findings [--out results] [--preset quick]
+    fill each paper's README from its findings.md and the metrics of the runs
+
 python -m experiments run --help
     the options
 
@@ -22,6 +25,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from . import findings
 from .config import fill, override
 from .data import VARIABLE, Data
 from .errors import UserError, unknown
@@ -37,8 +41,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command, *rest = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
         if command == "run":
             return _run(rest)
+        if command == "findings":
+            return _findings(rest)
         if command not in ("list", "-h", "--help"):
-            raise unknown("command", command, ["list", "run"])
+            raise unknown("command", command, ["list", "run", "findings"])
         if rest:
             raise UserError(f"{command}: unexpected argument {rest[0]!r}")
         print(_listing(entries()) if command == "list" else __doc__)
@@ -55,6 +61,14 @@ def _listing(known: dict[str, Entry]) -> str:
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     padded = (map(str.ljust, line, widths) for line in lines)
     return "\n".join("  ".join(line).rstrip() for line in padded)
+
+
+def _findings(arguments: list[str]) -> int:
+    options, rest = _parser().parse_known_args(arguments)
+    if rest:
+        raise UserError(f"findings: unexpected argument {rest[0]!r}")
+    print(*findings.fill(entries(), options.out, options.preset), sep="\n")
+    return 0
 
 
 def _run(arguments: list[str]) -> int:

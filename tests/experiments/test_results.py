@@ -10,7 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from experiments.runner import Column, Context, Data, Table
+from experiments.runner import Column, Context, Data, Table, UserError
+from experiments.runner.findings import fill
+from experiments.runner.registry import entries
 from experiments.runner.report import plain, to_csv, to_json, to_markdown, write
 
 
@@ -190,3 +192,32 @@ def test_path_makes_folders(tmp_path):
     context.path("probes/grace.png", "Grace").write_bytes(b"")
     context.path("raw.npz").write_bytes(b"")
     assert context.pictures == {"probes/grace.png": "Grace"}
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("{first | degree=2 | sum | .1f}", "12.0"),
+        ("{first | | max sum | .0f}", "12"),
+        ("{first | | count sum | d}", "2"),
+    ],
+)
+def test_places_of_findings(toys, place, said):
+    toys.run("toy")
+    (toys.folder / "toy" / "findings.md").write_text(f"So: {place}.")
+    ours = {name: entry for name, entry in entries().items() if name.startswith("toy")}
+    [path] = fill(ours, toys.out, "quick")
+    text = path.read_text()
+    assert text.startswith(f"So: {said}.")
+    assert "`toy`: " in text
+
+
+@pytest.mark.parametrize(
+    "place", ["{first | | sum | .1f}", "{first | degree=9 | sum | .1f}", "{x | | sum | d}"]
+)
+def test_places_that_name_no_number_are_refused(toys, place):
+    toys.run("toy")
+    (toys.folder / "toy" / "findings.md").write_text(place)
+    ours = {name: entry for name, entry in entries().items() if name.startswith("toy")}
+    with pytest.raises(UserError, match=r"toy/findings\.md"):
+        fill(ours, toys.out, "quick")

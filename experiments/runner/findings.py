@@ -1,0 +1,79 @@
+"""Fill each paper's README from its findings and the metrics of its runs."""
+
+import json
+import re
+import statistics
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .errors import UserError
+from .registry import Entry
+
+_OF = {"min": min, "max": max, "median": statistics.median, "count": len}
+_PLACE = re.compile(r"\{([^{}|]+)\|([^{}]*)\|([^{}|]+)\|([^{}|]*)\}")
+
+
+def fill(entries: Mapping[str, Entry], results: Path, preset: str) -> list[Path]:
+    """Write ``README.md`` beside each ``findings.md``, and return the files written.
+
+    A placeholder ``{table1 | method=tiles; degree=4 | psnr_object | .1f}`` is the number of the one
+    row of that experiment whose keys are as told; ``| min psnr_object |`` (or max, median, count)
+    is that of all such rows.
+    """
+    written = []
+    for folder in sorted({entry.path.parent for entry in entries.values()}):
+        template = folder / "findings.md"
+        if template.exists():
+            known = {e.path.stem: e.name for e in entries.values() if e.path.parent == folder}
+            text = _filled(template, known, results, preset)
+            written.append(folder / "README.md")
+            written[-1].write_text(text, encoding="utf-8")
+    return written
+
+
+def _filled(template: Path, known: Mapping[str, str], results: Path, preset: str) -> str:
+    used: dict[str, dict[str, Any]] = {}
+
+    def number(match: re.Match) -> str:
+        stem, where, key, style = (part.strip() for part in match.groups())
+        if stem not in known:
+            raise UserError(f"{template.parent.name}/findings.md: no experiment {stem!r}")
+        run = results / known[stem] / preset
+        if not (run / "metrics.json").exists():
+            raise UserError(f"{template.parent.name}/findings.md: no results in {str(run)!r}")
+        used[known[stem]] = json.loads((run / "environment.json").read_text(encoding="utf-8"))
+        rows = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+        of, _, rest = key.partition(" ")
+        key = rest if of in _OF else key
+        wanted = dict(pair.split("=", 1) for pair in where.split("; ") if pair)
+        values = [row[key] for row in rows if key in row and _meets(row, wanted)]
+        if not values or (of not in _OF and len(values) > 1):
+            raise UserError(f"{template.parent.name}/findings.md: {match[0]}: {len(values)} rows")
+        return format(_OF[of](values) if of in _OF else values[0], style)
+
+    text = _PLACE.sub(number, template.read_text(encoding="utf-8"))
+    about = {_about(run): [] for run in used.values()}
+    for name, run in used.items():
+        about[_about(run)].append(f"`{name}`")
+    runs = "; ".join(f"{', '.join(sorted(names))}: {run}" for run, names in sorted(about.items()))
+    return (
+        f"{text.rstrip()}\n\n<sub>Figures: preset `{preset}`, filled in by `python -m experiments "
+        f"findings --preset {preset}`. {runs}.</sub>\n"
+    )
+
+
+def _about(run: Mapping[str, Any]) -> str:
+    names = [
+        f"{name} {run['versions'][name]}" for name in ("jaxsh", "jax") if run["versions"][name]
+    ]
+    data = run["data"] if run["data"].startswith("the ") else "a data folder"
+    return ", ".join([run["date"][:10], *names, run["dtype"], data])
+
+
+def _meets(row: Mapping[str, Any], wanted: Mapping[str, str]) -> bool:
+    return all(_text(row.get(key)) == value for key, value in wanted.items())
+
+
+def _text(value: Any) -> str:
+    return format(value, "g") if isinstance(value, float) else str(value)
