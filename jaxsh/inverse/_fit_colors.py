@@ -4,6 +4,7 @@ The one module that uses JAXopt, which warns on import that it is no longer main
 imported when it is used.
 """
 
+import functools
 import math
 import warnings
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ from ..transfer import Transfer
 from ._checks import check_data, check_end
 from ._result import Confidence, Recovered, Statistics
 from ._shading import irradiance
-from ._solve import covariance
+from ._solve import covariance, everywhere
 
 
 def _box_solver(max_steps: int, tolerance: float):
@@ -95,7 +96,12 @@ class _Channel(NamedTuple):
 
 
 @eqx.filter_jit
-def _fit(observed, transfer, albedo, weights, lights, upper, *, tolerance, max_steps):
+def _fit(observed, transfer, albedo, weights, lights, upper, **options):
+    fit = functools.partial(_recover, **options)
+    return everywhere(fit, observed, transfer, albedo, weights, lights, upper)
+
+
+def _recover(observed, transfer, albedo, weights, lights, upper, *, tolerance, max_steps):
     dtype = observed.dtype
     seen = jnp.where(weights[:, None] > 0, weights[:, None] * observed, 0)
     norm = jnp.linalg.norm(seen)

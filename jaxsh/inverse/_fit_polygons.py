@@ -1,5 +1,6 @@
 """Position, size and colour of rectangular lights from the shaded vertices of a mesh."""
 
+import functools
 import math
 from collections.abc import Sequence
 
@@ -10,13 +11,14 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import is_concrete
+from .._core.xla import on_mesh
 from ..midrange import Polygon
 from ..transfer import Transfer
 from ._checks import check_data, check_end
 from ._rectangle import Rectangle, moved, rectangle_of
 from ._result import Recovered, Statistics
 from ._shading import irradiance
-from ._solve import confidence, levenberg_marquardt
+from ._solve import confidence, everywhere, levenberg_marquardt
 
 
 def fit_polygons(
@@ -102,8 +104,13 @@ def _unstack(lights: Rectangle) -> tuple[Rectangle, ...]:
 
 
 @eqx.filter_jit
-def _fit(observed, transfer, albedo, weights, guesses, *, turn, tolerance, max_steps):
-    """`guesses`: rectangles whose leading axes are the guess and the light."""
+def _fit(observed, transfer, albedo, weights, guesses, **options):
+    fit = functools.partial(_recover, **options)
+    return everywhere(fit, observed, transfer, albedo, weights, guesses)
+
+
+def _recover(observed, transfer, albedo, weights, guesses, *, turn, tolerance, max_steps):
+    """Fits from `guesses`, rectangles whose leading axes are the guess and the light."""
     seen = jnp.where(weights[:, None] > 0, weights[:, None] * observed, 0)
     norm = jnp.linalg.norm(seen)
     norm = jnp.where(norm > 0, norm, 1)
@@ -124,6 +131,7 @@ def _fit(observed, transfer, albedo, weights, guesses, *, turn, tolerance, max_s
         guesses,
         tolerance=tolerance,
         max_steps=max_steps,
+        normal=on_mesh(observed, transfer),
     )
     value = decode(solved.parameters, jax.tree.map(lambda leaf: leaf[solved.start], guesses))
     squared = jnp.sum(solved.residual**2)

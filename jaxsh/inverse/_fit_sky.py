@@ -18,7 +18,7 @@ from ._charts import even_hemisphere, from_hemisphere, tangents, to_hemisphere, 
 from ._checks import check_data, check_end
 from ._result import Confidence, Recovered, Statistics
 from ._shading import Shading, compress
-from ._solve import confidence, levenberg_marquardt
+from ._solve import confidence, everywhere, levenberg_marquardt
 
 Sky = Callable[..., Array]
 
@@ -124,7 +124,12 @@ def _preetham(degree: int, narrow: bool) -> Sky:
 
 
 @eqx.filter_jit
-def _fit(
+def _fit(observed, coefficients, albedo, weights, **options) -> Recovered[SkyLight]:
+    fit = functools.partial(_recover, **options)
+    return everywhere(fit, observed, coefficients, albedo, weights)
+
+
+def _recover(
     observed, coefficients, albedo, weights, *, sky, bounds, exposure, starts, tolerance, max_steps
 ) -> Recovered[SkyLight]:
     shading = compress(observed, coefficients, albedo, weights)

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from .._core.linalg import einsum
 from ..midrange import Polygon, polygon_harmonics
 from ..transfer import Transfer
+from ._solve import triangle
 
 
 class Shading(eqx.Module):
@@ -48,13 +49,13 @@ def compress(
     albedo = jnp.broadcast_to(albedo, (len(seen), 1 if shared else 3))
     count = coefficients.shape[-1]
 
-    def triangle(row):
+    def of_channel(row):
         reflected, b = row
         shading = (weights * reflected / math.pi)[:, None] * coefficients
-        return jnp.linalg.qr(jnp.concatenate([shading, b], axis=1), mode="r")
+        return triangle(jnp.concatenate([shading, b], axis=1))
 
     columns = (seen / scale)[None] if shared else (seen / scale).T[..., None]
-    triangles = jax.lax.map(triangle, (albedo.T, columns))
+    triangles = jax.lax.map(of_channel, (albedo.T, columns))
     operator, target = triangles[..., :count], triangles[..., count:]
     return Shading(jnp.moveaxis(target, -1, 0 if shared else 1).reshape(3, -1), operator, scale)
 

@@ -1,16 +1,19 @@
 """Nonlinear least squares from many starts at once, and what the data tell of the answer."""
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import lineax as lx
 import optimistix as optx
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, Int
 
 from .._core.linalg import einsum, matmul
+from .._core.xla import keep_rows
 from ._result import Confidence
 
 # Ends whose residuals differ by less than this, in units of the data, are in the same valley.
@@ -49,29 +52,32 @@ def levenberg_marquardt(
     *,
     tolerance: float,
     max_steps: int,
+    normal: bool = False,
 ) -> Solved:
     """The least ‖residual‖² that any of the starts leads to; residuals in units of the data.
 
     `residual` takes the unknowns and, of the `constants`, a tree of arrays, those of its start.
     Among ends as good as the best, one that has converged goes before one that has not.
+
+    `normal`: each step by its normal equations instead of QR. It loses digits of a step, not of the
+    end, and sums over residuals that several devices share where QR would gather them.
     """
-    solver = optx.LevenbergMarquardt(tolerance, tolerance)
+    linear = lx.Normal(lx.Cholesky()) if normal else lx.QR()
+    solver = optx.LevenbergMarquardt(tolerance, tolerance, linear_solver=linear)
     solver = eqx.tree_at(lambda s: s.search, solver, _Damping(solver.search))
 
     def with_itself(p, constants):
         value = residual(p, constants)
         return value, value
 
-    def one(start):
-        p, args = start
+    @jax.jit  # traced once for both ways below
+    def one(p, args):
         solution = optx.least_squares(
             with_itself, solver, p, args, has_aux=True, max_steps=max_steps, throw=False
         )
         return solution.value, solution.aux, solution.result, solution.stats["num_steps"]
 
-    # One after the other: each stops when it is done, and XLA compiles this three times as fast
-    # as all side by side.
-    values, residuals, results, steps = jax.lax.map(one, (starts, constants))
+    values, residuals, results, steps = _from_each(one, starts, constants)
     costs = jnp.sum(residuals**2, axis=-1)
     costs = jnp.where(jnp.isfinite(costs), costs, jnp.inf)
     same = jnp.linalg.norm(residuals - residuals[jnp.argmin(costs)][None], axis=-1) < _SAME
@@ -81,8 +87,48 @@ def levenberg_marquardt(
     return Solved(values[best], residuals[best], result, steps[best], best, jnp.sum(same))
 
 
+def _from_each(one, starts, constants):
+    """Calls `one(start, constants)` for each start.
+
+    On the CPU one after the other: each stops when it is done, and XLA compiles this three times
+    as fast as all side by side, which is what keeps an accelerator busy.
+    """
+
+    def in_turn(*arguments):
+        return jax.lax.map(lambda start: one(*start), arguments)
+
+    if jax.default_backend() == "cpu":  # there is no accelerator: the other way is not even traced
+        return in_turn(starts, constants)
+    return jax.lax.platform_dependent(starts, constants, cpu=in_turn, default=jax.vmap(one))
+
+
+def everywhere(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Calls `function(*arguments)` on arrays that a mesh shares out; each device holds the results.
+
+    With explicit axes JAX would ask of each operation how its result is to be shared out.
+    """
+    arrays = [leaf for leaf in jax.tree.leaves(arguments) if isinstance(leaf, jax.Array)]
+    shared = [a for a in arrays if tuple(jax.typeof(a).sharding.spec)[:1] not in ((), (None,))]
+    return keep_rows(function, *arguments, like=(shared or arrays)[0], axis=0, out=None)
+
+
+def triangle(tall: Float[Array, "v p"]) -> Float[Array, "r p"]:
+    """R of tall = QR, which has the singular values and right singular vectors of `tall`.
+
+    On a mesh each device makes its own of its rows, and one is made of these: no device then needs
+    the rows of another.
+    """
+    devices = math.prod(jax.typeof(tall).sharding.mesh.axis_sizes)
+    if devices > 1:
+        rows = jnp.pad(tall, ((0, -len(tall) % devices), (0, 0)))
+        parts = rows.reshape(devices, -1, tall.shape[1])
+        tall = jnp.linalg.qr(parts, mode="r").reshape(-1, tall.shape[1])
+    return jnp.linalg.qr(tall, mode="r")
+
+
 def covariance(jacobian: Float[Array, "r p"], variance: Float[Array, ""]) -> Float[Array, "p p"]:
     """variance · (JᵀJ)⁻¹ by singular values; all infinite where J has less than full rank."""
+    jacobian = triangle(jacobian)
     # Columns of length 1, so that units of parameters do not decide about the rank.
     lengths = jnp.linalg.norm(jacobian, axis=0)
     scaled = jacobian / jnp.where(lengths > 0, lengths, 1)[None]

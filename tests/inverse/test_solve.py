@@ -24,3 +24,22 @@ def test_the_best_start_wins_in_either_dtype_under_x64(dtype):
     assert solved.result == optx.RESULTS.successful
     assert (solved.start, solved.agreeing) == (1, 1)
     np.testing.assert_allclose(solved.parameters, [1, 1], rtol=0, atol=1e-5)
+
+
+def test_starts_go_side_by_side_off_the_cpu(monkeypatch):
+    """Beside the solver's own loop there is one over starts on the CPU alone."""
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+
+    def residual(p, constant):
+        return jnp.stack([p[0] ** 2 - constant, p[1] - p[0]])
+
+    def solve(starts, constants):
+        solved = levenberg_marquardt(residual, starts, constants, tolerance=1e-4, max_steps=9)
+        return solved.residual
+
+    traced = jax.jit(solve).trace(jnp.ones((3, 2)), jnp.ones(3))
+    loops = [
+        traced.lower(lowering_platforms=(platform,)).as_text().count("stablehlo.while")
+        for platform in ("cpu", "cuda")
+    ]
+    assert loops == [2, 1]

@@ -256,3 +256,12 @@ def test_bad_input_is_refused(unchecked):
         sky.project_preetham(np.ones((2, 3)), np.full(5, 3.0))
     with pytest.raises(ValueError, match=r"a model must return radiance \(n, channels\)"):
         sky.project(lambda view, sun: view[:, 2], sun_at(20.0))
+
+
+@pytest.mark.parametrize(("suns", "loops"), [(3, [1, 0]), (2000, [1, 1])])
+def test_suns_go_many_at_once_off_the_cpu(suns, loops):
+    """One after the other on the CPU, on an accelerator a thousand at a time."""
+    project = jax.jit(lambda sun, turbidity: sky.project_preetham(sun, turbidity, 1))
+    traced = project.trace(jnp.ones((suns, 3)), jnp.ones(suns))
+    texts = [traced.lower(lowering_platforms=(p,)).as_text() for p in ("cpu", "cuda")]
+    assert [text.count("stablehlo.while") for text in texts] == loops

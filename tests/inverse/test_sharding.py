@@ -1,0 +1,102 @@
+"""Fits of vertices that two devices share: the same answer, and neither gets all the vertices."""
+
+import re
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.sharding import AxisType, NamedSharding
+from jax.sharding import PartitionSpec as P
+
+from jaxsh import inverse, transfer
+from jaxsh.inverse._solve import triangle
+from jaxsh.midrange import Polygon, polygon_harmonics
+
+COUNT = 64
+KINDS = AxisType.Auto, AxisType.Explicit
+
+
+@pytest.fixture
+def lit(rng):
+    """A ball of unshadowed vertices, in float64."""
+    normals = rng.normal(size=(COUNT, 3))
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    return transfer.unshadowed(0.3 * normals, normals, 1)
+
+
+def shared_out(kind, *trees):
+    """The leading axis of every array shared out."""
+    mesh = jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+    return jax.device_put(trees, NamedSharding(mesh, P("rows")))
+
+
+def check(fit, kind, value, *arguments):
+    """Finds the value from observations that two devices share; none gets those of the other."""
+    placed = shared_out(kind, *arguments)
+    compiled = jax.jit(fit).lower(*placed).compile()
+    found = compiled(*placed)
+    assert found.converged
+    for a, b in zip(jax.tree.leaves(found.value), jax.tree.leaves(value), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-5)
+    for line in compiled.as_text().splitlines():
+        if " all-gather" in line:
+            sizes = re.findall(r"\d+", line.partition("[")[2].partition("]")[0])
+            assert max(map(int, sizes), default=0) < COUNT, line  # triangles of the devices at most
+    return found
+
+
+def glow(sun, turbidity):
+    """A sky of degree 1 that is compiled faster than Preetham's."""
+    return jnp.tile(jnp.concatenate([jnp.ones(1), turbidity * sun[jnp.array([1, 2, 0])]]), (3, 1))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_sky(kind, lit, rng):
+    sun = jnp.array([0.6, 0.0, 0.8])
+    observed = transfer.shade_diffuse(glow(sun, 3.0), lit, 0.5)
+    observed = observed + jnp.asarray(1e-6 * rng.normal(size=observed.shape))
+    fit = lambda o, t: inverse.fit_sky(o, t, 0.5, sky=glow, starts=2)  # noqa: E731
+    found = check(fit, kind, (sun, 3.0, 1.0), observed, lit)
+    if kind == KINDS[0]:
+        expected = jax.jit(fit)(observed, lit).confidence.covariance
+        np.testing.assert_allclose(found.confidence.covariance, expected, rtol=1e-4, atol=1e-18)
+
+
+def lamp(x, radiance):
+    corners = [[x, -0.2, 1.5], [x, 0.2, 1.5], [x + 0.4, 0.2, 1.5], [x + 0.4, -0.2, 1.5]]
+    return Polygon(jnp.array(corners), jnp.array(radiance))
+
+
+def seen(lit, lights):
+    light = sum(polygon_harmonics(one, lit.positions, lit.degree) for one in lights)
+    return transfer.shade_diffuse(light, lit, 0.5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_colors(kind, lit):
+    lights = lamp(-1.0, [2.0, 1.0, 0.0]), lamp(0.6, [0.5, 1.0, 3.0])
+    fit = lambda o, t: inverse.fit_colors(o, t, 0.5, lights)  # noqa: E731
+    check(fit, kind, jnp.stack([p.radiance for p in lights]), seen(lit, lights), lit)
+
+
+@pytest.mark.parametrize(
+    "kind", [AxisType.Explicit, pytest.param(AxisType.Auto, marks=pytest.mark.slow)]
+)
+def test_polygons(kind, lit):
+    start = [lamp(-0.8, [1.0, 1.0, 1.0])]
+    fit = lambda o, t: inverse.fit_polygons(o, t, 0.5, start, turn=False)  # noqa: E731
+    truth = lamp(-1.0, [2.0, 1.0, 0.5])
+    check(fit, kind, inverse.rectangle_of(truth), seen(lit, [truth]), lit)
+
+
+@pytest.mark.parametrize("rows", [6, 64])
+def test_triangle(rows, rng):
+    """R of QR but for signs: the same Gram matrix, and singular values."""
+    tall = rng.normal(size=(rows, 5))
+    expected = np.linalg.svd(tall, compute_uv=False)
+    for kind in KINDS[:1]:
+        (placed,) = shared_out(kind, tall)
+        for r in (triangle(jnp.asarray(tall)), jax.jit(triangle)(placed)):
+            np.testing.assert_allclose(np.asarray(r).T @ r, tall.T @ tall, atol=1e-13)
+            np.testing.assert_allclose(np.linalg.svd(r, compute_uv=False), expected, 1e-13)
