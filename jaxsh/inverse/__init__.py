@@ -1,4 +1,4 @@
-"""Shading read backwards: the light that made the colours of a surface, and how surely.
+"""Shading read backwards: the light that made the colors of a surface, and how surely.
 
 Every fit gives one `Recovered`: value, result code, statistics and confidence. Each starts from
 many places at once, so that it does not end in the wrong valley, and none that has not converged

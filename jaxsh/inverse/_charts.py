@@ -1,4 +1,4 @@
-"""From free numbers to what has bounds: smooth, and with each bound at a finite place.
+"""Smooth maps from unconstrained to bounded parameters, with each bound at a finite place.
 
 A solver of unbounded problems then meets none. Sines fold: beyond a bound the value comes back,
 so that a value on the bound is reached, and is where the slope vanishes. (A sigmoid reaches its
@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 
 
 def to_hemisphere(q: Float[Array, " 2"]) -> Float[Array, " 3"]:
-    """The upper hemisphere: θ = π/2 · sin |q| from the zenith, towards (q_x, q_y).
+    """Maps the plane onto the upper hemisphere: θ = π/2 · sin |q|, towards (q_x, q_y).
 
     Smooth, at the zenith (q = 0) too, where angles are not; the horizon is |q| = π/2.
     """
@@ -29,19 +29,19 @@ def to_hemisphere(q: Float[Array, " 2"]) -> Float[Array, " 3"]:
 
 
 def from_hemisphere(directions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
-    """The inverse of `to_hemisphere` for unit vectors."""
+    """Inverts `to_hemisphere` for unit vectors."""
     radius = np.linalg.norm(directions[:, :2], axis=-1, keepdims=True)
     theta = np.arctan2(radius, directions[:, 2:])
     return directions[:, :2] / np.maximum(radius, 1e-300) * np.arcsin(2 / math.pi * theta)
 
 
 def to_interval(p: Float[Array, ""], low: float, high: float) -> Float[Array, ""]:
-    """[low, high]: its middle and half its length times sin p."""
+    """Maps p into [low, high]: its middle and half its length times sin p."""
     return (low + high) / 2 + (high - low) / 2 * jnp.sin(p)
 
 
 def tangents(direction: Float[Array, " 3"]) -> Float[Array, "2 3"]:
-    """Two unit vectors square to a unit vector of the upper hemisphere, and to each other.
+    """Finds two unit vectors square to a unit vector of the upper hemisphere, and to each other.
 
     Duff et al. 2017; smooth for z > -1.
     """
@@ -52,7 +52,7 @@ def tangents(direction: Float[Array, " 3"]) -> Float[Array, "2 3"]:
 
 
 def even_hemisphere(count: int) -> Float[np.ndarray, "n 3"]:
-    """Directions along a spiral from close to the zenith to close to the horizon."""
+    """Directions along a spiral, from close to the zenith to close to the horizon."""
     n = np.arange(count)
     z, phi = 1 - (n + 0.5) / count, math.pi * (1 + math.sqrt(5)) * n
     radius = np.sqrt(1 - z * z)

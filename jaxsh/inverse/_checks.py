@@ -1,4 +1,4 @@
-"""What every fit asks of its data, and what it says where it did not end well."""
+"""Checks of a fit's data before it starts, and of how it ended."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -15,7 +15,7 @@ def check_data(
     albedo: Float[ArrayLike, "..."],
     weights: Float[ArrayLike, "..."] | None,
 ) -> tuple[Float[Array, "v 3"], Float[Array, "..."], Float[Array, " v"]]:
-    """Observed, albedo and weights in the transfer's dtype; without weights, ones.
+    """Converts observed, albedo and weights to the transfer's dtype; without weights, ones.
 
     Raises `ValueError` for shapes that do not fit, and, where values are known, for data that
     are not finite, all zero, or weighted by less than 0.

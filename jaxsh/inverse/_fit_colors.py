@@ -1,4 +1,4 @@
-"""Colours of lights whose shapes are known, between bounds.
+"""Colors of lights whose shapes are known, between bounds.
 
 The one module that uses JAXopt, which warns on import that it is no longer maintained; so it is
 imported when it is used.
@@ -45,7 +45,7 @@ def fit_colors(
     max_steps: int = 1000,
     throw: bool = True,
 ) -> Recovered[Float[Array, "n 3"]]:
-    """Radiance of each light, at least 0 and at most `upper`, from the shading of a diffuse mesh.
+    """Finds the radiance of each light, in [0, `upper`], from the shading of a diffuse mesh.
 
     Least squares with bounds, min ‖A x − b‖² for 0 <= x <= upper in each channel: shading is
     linear in the radiances. It is made small first (the Gram matrix of n lights), so that what
@@ -57,16 +57,32 @@ def fit_colors(
     - `lights`: the shapes; their own radiance does not count.
     - `tolerance`: of the optimality of the answer, in units of the data; 1e-10, and ε in float32.
 
+    Vertices may be shared out over a mesh of devices.
+
     **Returns** a `Recovered` with the radiances (n, 3) in the transfer's dtype. `at_bound` tells
     whether any is at a bound; the confidence is that of least squares without bounds, and counts
-    one start.
+    one start. Not differentiable.
 
     Raises `ValueError` for shapes that do not fit, no lights, bounds that are none, and, where
     values are known, for data that are not finite or all zero.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import inverse, midrange, sphere, transfer
+    >>> normals = sphere.fibonacci(20).directions
+    >>> ball = transfer.unshadowed(0.5 * normals, normals, 1)
+    >>> corners = [[-1.0, -1.0, 2.0], [-1.0, 1.0, 2.0], [1.0, 1.0, 2.0], [1.0, -1.0, 2.0]]
+    >>> lamp = midrange.Polygon(jnp.asarray(corners), jnp.asarray([3.0, 2.0, 1.0]))
+    >>> light = midrange.polygon_harmonics(lamp, ball.positions, 1)
+    >>> observed = transfer.shade_diffuse(light, ball, 0.5)
+    >>> found = inverse.fit_colors(observed, ball, 0.5, [lamp])
+    >>> [round(float(channel), 2) for channel in found.value[0]]
+    [3.0, 2.0, 1.0]
     """
     observed, albedo, weights = check_data(observed, transfer, albedo, weights)
     if not lights:
-        raise ValueError("colours need at least one light")
+        raise ValueError("colors need at least one light")
     if not upper > 0:
         raise ValueError(f"the upper bound must be above 0, got {upper}")
     default = max(1e-10, float(jnp.finfo(observed.dtype).eps))
@@ -80,12 +96,12 @@ def fit_colors(
         tolerance=default if tolerance is None else tolerance,
         max_steps=max_steps,
     )
-    check_end(recovered, "the colours were", throw=throw)
+    check_end(recovered, "the colors were", throw=throw)
     return recovered
 
 
 class _Channel(NamedTuple):
-    """Of one channel: the radiances, and what tells how good they are."""
+    """Radiances of one channel, and what tells how good they are."""
 
     radiance: Float[Array, " n"]
     residual: Float[Array, " v"]
@@ -134,7 +150,7 @@ def _recover(observed, transfer, albedo, weights, lights, upper, *, tolerance, m
 def _channel(
     solver, matrix: Float[Array, "v n"], target: Float[Array, " v"], upper: Float[Array, ""]
 ) -> _Channel:
-    """min ‖matrix · x − target‖² for 0 <= x <= upper."""
+    """Minimises ‖matrix · x − target‖² for 0 <= x <= upper."""
     lengths = jnp.linalg.norm(matrix, axis=0)
     lengths = jnp.where(lengths > 0, lengths, 1)
     unit = matrix / lengths[None]
@@ -154,7 +170,7 @@ def _channel(
 def _confidence(
     jacobians: Float[Array, "3 v n"], variance: Float[Array, ""]
 ) -> Confidence[Float[Array, "n 3"]]:
-    """Channels do not know of each other: blocks, put where (n, 3) has them."""
+    """Confidence by channels, which do not depend on each other: blocks, in the order of (n, 3)."""
     count = jacobians.shape[-1]
     blocks = jax.vmap(lambda jacobian: covariance(jacobian, variance))(jacobians)
     whole = jnp.isfinite(blocks).all()

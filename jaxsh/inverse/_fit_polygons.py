@@ -1,4 +1,4 @@
-"""Position, size and colour of rectangular lights from the shaded vertices of a mesh."""
+"""Position, size and color of rectangular lights from the shaded vertices of a mesh."""
 
 import functools
 import math
@@ -33,7 +33,7 @@ def fit_polygons(
     max_steps: int = 256,
     throw: bool = True,
 ) -> Recovered[tuple[Rectangle, ...]]:
-    """Rectangular lights that shaded a diffuse mesh so: place, pose, size and colour.
+    """Finds the rectangular lights that shaded a diffuse mesh: place, pose, size and color.
 
     Minimises Σ_v w_v² ‖observed_v − albedo/π Σ_lights L T_v · c(light, x_v)‖² with Levenberg and
     Marquardt's method, where c are the exact coefficients at the vertex itself
@@ -63,6 +63,24 @@ def fit_polygons(
 
     Raises `ValueError` for shapes that do not fit, and, where values are known, for data that are
     not finite or all zero, and guesses without positive radiance.
+
+    Vertices may be shared out over a mesh of devices: each step then comes from its normal
+    equations, which sum over vertices.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import inverse, midrange, sphere, transfer
+    >>> normals = sphere.fibonacci(20).directions
+    >>> ball = transfer.unshadowed(0.5 * normals, normals, 1)
+    >>> corners = [[-1.0, -1.0, 2.0], [-1.0, 1.0, 2.0], [1.0, 1.0, 2.0], [1.0, -1.0, 2.0]]
+    >>> lamp = midrange.Polygon(jnp.asarray(corners), jnp.asarray([3.0, 2.0, 1.0]))
+    >>> light = midrange.polygon_harmonics(lamp, ball.positions, 1)
+    >>> observed = transfer.shade_diffuse(light, ball, 0.5)
+    >>> guess = midrange.Polygon(lamp.vertices + 0.1, jnp.ones(3))
+    >>> found = inverse.fit_polygons(observed, ball, 0.5, [guess], turn=False)
+    >>> [round(float(channel), 2) for channel in found.value[0].radiance]
+    [3.0, 2.0, 1.0]
     """
     observed, albedo, weights = check_data(observed, transfer, albedo, weights)
     guesses = _guesses(start, observed.dtype)
@@ -82,7 +100,7 @@ def fit_polygons(
 
 
 def _guesses(start, dtype) -> Rectangle:
-    """All lights of all guesses in one `Rectangle`, whose leading axes are guess and light."""
+    """Stacks the lights of all guesses in one `Rectangle`; leading axes are guess and light."""
     single = all(isinstance(p, Polygon) for p in start)
     guesses = [tuple(start)] if single else [tuple(guess) for guess in start]
     counts = {len(guess) for guess in guesses}
@@ -153,10 +171,10 @@ def _recover(observed, transfer, albedo, weights, guesses, *, turn, tolerance, m
 
 
 def _irradiance(lights: Rectangle, transfer: Transfer) -> Float[Array, "v 3"]:
-    """Of all lights together. In a loop: XLA compiles one light, not each."""
+    """Irradiance of all lights together. In a loop: XLA compiles one light, not each."""
 
     def add(total, light):
-        # One channel is enough: the colour is a factor.
+        # One channel is enough: the color is a factor.
         white = Polygon(light.vertices, jnp.ones(3, total.dtype))
         return total + irradiance(white, transfer)[:, None] * light.radiance[None], None
 

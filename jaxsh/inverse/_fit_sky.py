@@ -27,10 +27,18 @@ _AT_BOUND = 1e-5
 
 
 class SkyLight(eqx.Module):
-    """What the sky is known by: sun (3,), a unit vector; turbidity; exposure.
+    """Parameters of a sky: sun (3,), a unit vector; turbidity; exposure.
 
     In a `Confidence` the deviations of each: √(x² + y² + z²) of the sun's is the RMS angle, in
-    radians, by which it may be off.
+    radians, by which it may be off. Found by `fit_sky`.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import inverse, sky
+    >>> light = inverse.SkyLight(jnp.asarray([0.6, 0.0, 0.8]), jnp.asarray(3.0), jnp.asarray(1.0))
+    >>> (light.exposure * sky.preetham_harmonics(light.sun, light.turbidity, 1)).shape
+    (3, 4)
     """
 
     sun: Float[Array, " 3"]
@@ -52,7 +60,7 @@ def fit_sky(
     max_steps: int = 512,
     throw: bool = True,
 ) -> Recovered[SkyLight]:
-    """The sun's direction and the turbidity that shaded a diffuse mesh so, by least squares.
+    """Finds the sun's direction and the turbidity that shaded a diffuse mesh, by least squares.
 
     Minimises Σ_v w_v² ‖observed_v − exposure · shade_diffuse(sky(sun, turbidity))_v‖² with
     Levenberg and Marquardt's method. The sky's own light alone: take away what the sun's disc
@@ -78,13 +86,31 @@ def fit_sky(
     **Returns** a `Recovered` with a `SkyLight`, in the transfer's dtype. `jit` and `vmap` as you
     like; not differentiable.
 
-    Parameters are free of bounds and of the zenith's singularity (`_charts`). A sun on the horizon
+    Parameters are free of bounds and of the zenith's singularity. A sun on the horizon
     and a turbidity at its bound are reached, in more steps. Within a degree of the zenith most
     starts end on the kink that the model has there; the others find the sun. An exposure is
     positive, and with it free all that brightness tells is lost; see what `confidence` says.
 
     Raises `ValueError` for shapes that do not fit, and, where values are known, for data that
     are not finite, all zero, or weighted by less than 0.
+
+    Vertices may be shared out over a mesh of devices: each makes a small triangle of its own.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import inverse, sphere, transfer
+    >>> normals = sphere.fibonacci(20).directions
+    >>> ball = transfer.unshadowed(0.5 * normals, normals, 1)
+    >>> def glow(sun, turbidity):
+    ...     x, y, z = sun
+    ...     row = jnp.stack([jnp.ones_like(x), turbidity * y, turbidity * z, turbidity * x])
+    ...     return jnp.stack([row] * 3)
+    >>> light = glow(jnp.asarray([0.6, 0.0, 0.8]), jnp.asarray(3.0))
+    >>> observed = transfer.shade_diffuse(light, ball, 0.5)
+    >>> found = inverse.fit_sky(observed, ball, 0.5, sky=glow, starts=2)
+    >>> [round(float(x), 2) + 0.0 for x in found.value.sun], round(float(found.value.turbidity), 2)
+    ([0.6, 0.0, 0.8], 3.0)
     """
     observed, albedo, weights = check_data(observed, transfer, albedo, weights)
     low, high = turbidity
@@ -113,7 +139,7 @@ def fit_sky(
 
 
 def _tolerance(dtype) -> float:
-    """Of the last step. Where steps converge as Newton's do, the next one is about its square."""
+    """Tolerance of the last step: where steps converge as Newton's do, the next is its square."""
     return max(1e-5, float(jnp.finfo(dtype).eps) ** 0.5)
 
 
@@ -168,7 +194,7 @@ def _recover(
 
 
 def to_sky(p: Float[Array, " p"], bounds: tuple[float, float]) -> SkyLight:
-    """Free numbers to a sky of exposure 1."""
+    """Maps free numbers to a sky of exposure 1."""
     return SkyLight(to_hemisphere(p[:2]), to_interval(p[2], *bounds), jnp.ones((), p.dtype))
 
 
@@ -177,7 +203,7 @@ def _residual(shading: Shading, sky: Sky, light: SkyLight) -> Float[Array, " r"]
 
 
 def _brightness(shading: Shading, sky: Sky, light: SkyLight) -> Float[Array, ""]:
-    """The exposure that fits this sky best, or 1 where that is not positive."""
+    """Finds the exposure that fits this sky best, or 1 where that is not positive."""
     target = shading.target.ravel()
     shaded = _residual(shading, sky, light) + target
     along, own = jnp.sum(shaded * target), jnp.sum(shaded * shaded)
@@ -192,7 +218,7 @@ def _starts(count: int, dtype) -> Float[Array, "s 3"]:
 
 
 def _confidence(shading, sky, value: SkyLight, variance, free: bool) -> Confidence[SkyLight]:
-    """With steps on the sphere itself, which unlike the charts have no edge and no fold."""
+    """Confidence by steps on the sphere itself, which unlike the charts have no edge or fold."""
     along = tangents(value.sun)
 
     def moved(step) -> SkyLight:

@@ -1,4 +1,4 @@
-"""A rectangular light, and how it moves."""
+"""Rectangular lights, and how they move."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -9,10 +9,21 @@ from ..midrange import Polygon
 
 
 class Rectangle(eqx.Module):
-    """A rectangular light: center ± ½ width·(first axis) ± ½ height·(second axis).
+    """Rectangular light: center ± ½ width·(first axis) ± ½ height·(second axis).
 
     It emits `radiance` towards first × second axis. In a `Confidence` the deviations of each
     number; those of `axes` (2, 3) are of the rotation, in radians along the axes' own components.
+    `vertices` (4, 3) run counter-clockwise seen from the side that emits; `polygon` is the same
+    light for `midrange`. Differentiable in everything.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import inverse
+    >>> axes = jnp.asarray([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    >>> lamp = inverse.Rectangle(jnp.zeros(3), axes, jnp.asarray([2.0, 4.0]), jnp.ones(3))
+    >>> lamp.vertices.tolist()
+    [[-1.0, -2.0, 0.0], [1.0, -2.0, 0.0], [1.0, 2.0, 0.0], [-1.0, 2.0, 0.0]]
     """
 
     center: Float[Array, " 3"]
@@ -32,7 +43,20 @@ class Rectangle(eqx.Module):
 
 
 def rectangle_of(polygon: Polygon) -> Rectangle:
-    """The rectangle that a polygon of four vertices is, exactly where it is one."""
+    """Converts a polygon of four vertices to the rectangle that it is, exactly where it is one.
+
+    Elsewhere to a rectangle of the same center, with the mean lengths and directions of the sides.
+    Differentiable. Raises `ValueError` for another number of vertices.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import inverse, midrange
+    >>> corners = [[0.0, 0.0, 1.0], [0.0, 3.0, 1.0], [2.0, 3.0, 1.0], [2.0, 0.0, 1.0]]
+    >>> lamp = inverse.rectangle_of(midrange.Polygon(jnp.asarray(corners), jnp.ones(3)))
+    >>> lamp.center.tolist(), lamp.size.tolist()
+    ([1.0, 1.5, 1.0], [3.0, 2.0])
+    """
     v = polygon.vertices
     if v.shape != (4, 3):
         raise ValueError(f"a rectangle has 4 vertices, got a polygon of {len(v)}")
@@ -45,7 +69,7 @@ def rectangle_of(polygon: Polygon) -> Rectangle:
 
 
 def moved(light: Rectangle, p: Float[Array, " p"]) -> Rectangle:
-    """By p: center in units of its size, log of size, log of radiance, and rotation vector."""
+    """Moves a light by p: center in units of its size, logs of size and radiance, rotation vector."""
     size = light.size * jnp.exp(p[3:5])
     center = light.center + p[:3] * jnp.sqrt(light.size[0] * light.size[1])
     axes = light.axes if p.shape[0] == 8 else rotate(light.axes, p[8:])
@@ -53,7 +77,7 @@ def moved(light: Rectangle, p: Float[Array, " p"]) -> Rectangle:
 
 
 def rotate(axes: Float[Array, "2 3"], q: Float[Array, " 3"]) -> Float[Array, "2 3"]:
-    """By Cayley's rotation of the vector q: angle 2 arctan |q|/2, smooth everywhere."""
+    """Rotates by Cayley's rotation of the vector q: angle 2 arctan |q|/2, smooth everywhere."""
     half = q / 2
     squared = jnp.sum(half * half)
     crossed = jnp.cross(half[None], axes)

@@ -1,4 +1,4 @@
-"""What every fit gives back."""
+"""Results of every fit: a value, how it was found, and how sure it is."""
 
 from typing import Any, Generic, TypeVar
 
@@ -10,12 +10,26 @@ Value = TypeVar("Value")
 
 
 class Statistics(eqx.Module):
-    """How the solver came to its value.
+    """Report of the solver on its way to the value.
 
     `residual` is ‖observed − shaded‖ / ‖observed‖, weights included; `steps` are those of the
     start that won. `agreeing` counts the starts that ended in the same place, of `starts` in
     all: where only a few did, the problem has other valleys. `at_bound` tells that a bound stops
     the value: the data want one beyond.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import inverse, midrange, sphere, transfer
+    >>> normals = sphere.fibonacci(20).directions
+    >>> ball = transfer.unshadowed(0.5 * normals, normals, 1)
+    >>> corners = [[-1.0, -1.0, 2.0], [-1.0, 1.0, 2.0], [1.0, 1.0, 2.0], [1.0, -1.0, 2.0]]
+    >>> lamp = midrange.Polygon(jnp.asarray(corners), jnp.asarray([3.0, 2.0, 1.0]))
+    >>> light = midrange.polygon_harmonics(lamp, ball.positions, 1)
+    >>> observed = transfer.shade_diffuse(light, ball, 0.5)
+    >>> found = inverse.fit_colors(observed, ball, 0.5, [lamp])
+    >>> found.statistics.starts, bool(found.statistics.residual < 1e-5)
+    (1, True)
     """
 
     steps: Int[Array, ""]
@@ -26,7 +40,7 @@ class Statistics(eqx.Module):
 
 
 class Confidence(eqx.Module, Generic[Value]):
-    """How surely the data tell the value: s² D (JᵀJ)⁻¹ Dᵀ.
+    """Covariance and deviations of a recovered value: s² D (JᵀJ)⁻¹ Dᵀ.
 
     J is the Jacobian of the weighted residuals at the value, so JᵀJ the Hessian of Gauss and
     Newton; s² = ‖residuals‖² / (number of data − number of parameters); D carries the parameters
@@ -37,6 +51,20 @@ class Confidence(eqx.Module, Generic[Value]):
     It takes errors for independent, of equal size (weights aside) and zero on average. A model
     that is itself wrong errs all in one way, and by more than this tells. Infinite where the data
     do not determine all parameters.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import inverse, midrange, sphere, transfer
+    >>> normals = sphere.fibonacci(20).directions
+    >>> ball = transfer.unshadowed(0.5 * normals, normals, 1)
+    >>> corners = [[-1.0, -1.0, 2.0], [-1.0, 1.0, 2.0], [1.0, 1.0, 2.0], [1.0, -1.0, 2.0]]
+    >>> lamp = midrange.Polygon(jnp.asarray(corners), jnp.asarray([3.0, 2.0, 1.0]))
+    >>> light = midrange.polygon_harmonics(lamp, ball.positions, 1)
+    >>> observed = transfer.shade_diffuse(light, ball, 0.5)
+    >>> found = inverse.fit_colors(observed, ball, 0.5, [lamp])
+    >>> found.confidence.covariance.shape, found.confidence.deviation.shape
+    ((3, 3), (1, 3))
     """
 
     covariance: Float[Array, "n n"]
@@ -44,9 +72,24 @@ class Confidence(eqx.Module, Generic[Value]):
 
 
 class Recovered(eqx.Module, Generic[Value]):
-    """A value recovered from data, and what is known of it.
+    """Value recovered from data, with result code, statistics and confidence.
 
-    `result` is an `optimistix.RESULTS`; `message` puts it in words.
+    `result` is an `optimistix.RESULTS`; `message` puts it in words. Made by `fit_sky`,
+    `fit_polygons` and `fit_colors`.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import inverse, midrange, sphere, transfer
+    >>> normals = sphere.fibonacci(20).directions
+    >>> ball = transfer.unshadowed(0.5 * normals, normals, 1)
+    >>> corners = [[-1.0, -1.0, 2.0], [-1.0, 1.0, 2.0], [1.0, 1.0, 2.0], [1.0, -1.0, 2.0]]
+    >>> lamp = midrange.Polygon(jnp.asarray(corners), jnp.asarray([3.0, 2.0, 1.0]))
+    >>> light = midrange.polygon_harmonics(lamp, ball.positions, 1)
+    >>> observed = transfer.shade_diffuse(light, ball, 0.5)
+    >>> found = inverse.fit_colors(observed, ball, 0.5, [lamp])
+    >>> found.converged, found.message, found.value.shape
+    (True, 'successful', (1, 3))
     """
 
     value: Value
@@ -56,9 +99,10 @@ class Recovered(eqx.Module, Generic[Value]):
 
     @property
     def converged(self) -> bool:
-        """Whether the solver says so. Outside of `jit` and `vmap`."""
+        """True where the solver says so. Outside of `jit` and `vmap`."""
         return bool(self.result == optx.RESULTS.successful)
 
     @property
     def message(self) -> str:
+        """The result code in words."""
         return optx.RESULTS[self.result] or "successful"

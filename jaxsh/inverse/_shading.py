@@ -1,4 +1,4 @@
-"""Diffuse shading of a transfer: made small for one light, and of a near light."""
+"""Diffuse shading of a transfer, made small for one light, and of a near light."""
 
 import math
 
@@ -14,7 +14,7 @@ from ._solve import triangle
 
 
 class Shading(eqx.Module):
-    """w (observed - albedo/π · T L) of every vertex, turned until few rows hold all of it.
+    """Residuals w (observed - albedo/π · T L) of all vertices, turned until few rows hold them.
 
     Shading is linear in the light. With [w albedo/π T | w observed] = Q [R | b] in each channel,
     ‖w (observed - albedo/π · T L)‖ = ‖b - R L‖ exactly, so that what a fit does in each step does
@@ -26,7 +26,7 @@ class Shading(eqx.Module):
     scale: Float[Array, ""]
 
     def residual(self, light: Float[Array, "3 k"]) -> Float[Array, "3 r"]:
-        """Of a light of the operator's degree or below."""
+        """Residual of a light of the operator's degree or below."""
         operator = self.operator[..., : light.shape[-1]]
         operator = jnp.broadcast_to(operator, (3, *operator.shape[1:]))
         shaded = einsum("crk,ck->cr", operator, light)
@@ -39,7 +39,7 @@ def compress(
     albedo: Float[Array, "..."],
     weights: Float[Array, " v"],
 ) -> Shading:
-    """`albedo` is a number, (3,), (V, 1) or (V, 3)."""
+    """Compresses the shading of V vertices; `albedo` is a number, (3,), (V, 1) or (V, 3)."""
     # Where nothing weighs, nothing need be known.
     seen = jnp.where(weights[:, None] > 0, weights[:, None] * observed, 0)
     norm = jnp.linalg.norm(seen)
@@ -61,6 +61,6 @@ def compress(
 
 
 def irradiance(polygon: Polygon, transfer: Transfer) -> Float[Array, " v"]:
-    """From a polygon at each vertex, in the first channel."""
+    """Irradiance from a polygon at each vertex, in the first channel."""
     c = polygon_harmonics(polygon, transfer.positions, transfer.degree)[:, 0]
     return jnp.sum(transfer.coefficients * c, axis=-1)

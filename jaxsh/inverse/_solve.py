@@ -21,7 +21,7 @@ _SAME = 1e-3
 
 
 class _Damping(optx.AbstractSearch):
-    """Optimistix's, with its state in the unknowns' dtype, not in JAX's default float.
+    """Optimistix's search, with its state in the unknowns' dtype, not in JAX's default float.
 
     Otherwise fits in float32 fail under `jax_enable_x64`.
     """
@@ -54,7 +54,7 @@ def levenberg_marquardt(
     max_steps: int,
     normal: bool = False,
 ) -> Solved:
-    """The least ‖residual‖² that any of the starts leads to; residuals in units of the data.
+    """Finds the least ‖residual‖² that any of the starts leads to; residuals in units of the data.
 
     `residual` takes the unknowns and, of the `constants`, a tree of arrays, those of its start.
     Among ends as good as the best, one that has converged goes before one that has not.
@@ -127,7 +127,7 @@ def triangle(tall: Float[Array, "v p"]) -> Float[Array, "r p"]:
 
 
 def covariance(jacobian: Float[Array, "r p"], variance: Float[Array, ""]) -> Float[Array, "p p"]:
-    """variance · (JᵀJ)⁻¹ by singular values; all infinite where J has less than full rank."""
+    """Covariance variance · (JᵀJ)⁻¹ by singular values; infinite where J lacks full rank."""
     jacobian = triangle(jacobian)
     # Columns of length 1, so that units of parameters do not decide about the rank.
     lengths = jnp.linalg.norm(jacobian, axis=0)
@@ -146,7 +146,7 @@ def confidence(
     still: Float[Array, " p"],
     variance: Float[Array, ""],
 ) -> Confidence[Any]:
-    """Of the value `moved(still)`, from the slopes of its residual and of itself."""
+    """Confidence in the value `moved(still)`, from the slopes of its residual and of itself."""
     jacobian = jax.jacfwd(lambda step: residual(moved(step)))(still)
     carried = jax.jacfwd(lambda step: ravel_pytree(moved(step))[0])(still)
     spread = covariance(jacobian, variance)
