@@ -164,7 +164,8 @@ def _channel(
     residual = target - matmul(unit, x)
     at_bound = jnp.any((x <= bounds[0]) | (x >= bounds[1]))
     state = solution.state
-    return _Channel(x / lengths, residual, at_bound, state.iter_num, state.error, matrix)
+    radiance = jnp.where(x < bounds[1], x / lengths, upper)  # the bound itself, not its rounding
+    return _Channel(radiance, residual, at_bound, state.iter_num, state.error, matrix)
 
 
 def _confidence(

@@ -69,7 +69,7 @@ def rectangle_of(polygon: Polygon) -> Rectangle:
 
 
 def moved(light: Rectangle, p: Float[Array, " p"]) -> Rectangle:
-    """Moves a light by p: center in units of its size, logs of size and radiance, rotation vector."""
+    """Moves a light by p: center in units of its size, logs of size and radiance, rotation."""
     size = light.size * jnp.exp(p[3:5])
     center = light.center + p[:3] * jnp.sqrt(light.size[0] * light.size[1])
     axes = light.axes if p.shape[0] == 8 else rotate(light.axes, p[8:])
