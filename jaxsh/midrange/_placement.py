@@ -10,7 +10,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Bool, Float
-from scipy.cluster.vq import kmeans2, vq
 
 from ..harmonics import clamped_cosine, convolve, degree_of
 from ._expansion import Expansion, extrapolate
@@ -18,7 +17,7 @@ from ._expansion import Expansion, extrapolate
 Evaluate = Callable[[Float[np.ndarray, "n 3"]], Expansion]
 
 _TRIES = 4
-_CORE = 1e-3  # of the probes' extent: what is nearer than this to a sample is at it
+_CORE = 1e-3  # of the checks' extent: what is nearer than this to a sample is at it
 
 
 def place_samples(
@@ -29,7 +28,7 @@ def place_samples(
     evaluate: Evaluate | None = None,
     target: float | None = None,
     exponent: float = 6.0,
-    probes: int = 128,
+    checks: int = 128,
     candidates: int = 64,
     seed: int = 0,
 ) -> Float[np.ndarray, "s 3"]:
@@ -46,14 +45,14 @@ def place_samples(
       "farthest": the position nearest to the centroid, then always the one farthest from those
       chosen. Every position is near some sample, as near as for any choice to a factor of two.
       "greedy": out of `candidates` means of clusters, always the one with which the blend
-      (eqs. 15, 16) has the least error at `probes` of the positions; after each, samples are
+      (eqs. 15, 16) has the least error at `checks` of the positions; after each, samples are
       exchanged while that helps. Stops when the error is at most `target`, or at `count`, where
-      it is also tried from those of "kmeans" on; so at the probes it is never worse.
+      it is also tried from those of "kmeans" on; so at the checks it is never worse.
     - `evaluate`: for "greedy": the expansions of the light around points (n, 3), exact or
-      captured. It is called once, with all probes and candidates.
-    - `target`: for "greedy": relative RMS error of the irradiance, over probes and normals.
+      captured. It is called once, with all checks and candidates.
+    - `target`: for "greedy": relative RMS error of the irradiance, over checks and normals.
     - `exponent`: b of eq. 16 that the samples will be blended with.
-    - `seed`: of k-means and of the choice of probes.
+    - `seed`: of k-means and of the choice of checks.
 
     **Returns** the points (S, 3), NumPy, in the dtype of the positions. S = `count` but for
     "greedy" with a target that fewer meet. Runs on the host; not differentiable.
@@ -84,7 +83,7 @@ def place_samples(
     assert evaluate is not None
     clusters = _kmeans(positions, count, seed)
     pool = np.concatenate([clusters, _kmeans(positions, min(candidates, distinct), seed)])
-    prediction = Prediction.of(evaluate, pool, probes_of(positions, probes, seed), exponent)
+    prediction = Prediction.of(evaluate, pool, drawn_positions(positions, checks, seed), exponent)
     choice = Choice(prediction)
     while len(choice.chosen) < count and choice.error > (0 if target is None else target):
         if not choice.add():
@@ -99,6 +98,8 @@ def place_samples(
 
 def _kmeans(positions: np.ndarray, count: int, seed: int) -> np.ndarray:
     """Lloyd's iteration from k-means++, the best of a few tries."""
+    from scipy.cluster.vq import kmeans2, vq  # dear to import, and needed by placement alone
+
     rng, points = np.random.default_rng(seed), positions.astype(np.float64)
     tries = []
     with warnings.catch_warnings():
@@ -122,7 +123,7 @@ def _farthest(positions: np.ndarray, count: int) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class Prediction:
-    """Compares the light that n candidates predict at Q of the positions with the light there.
+    """Compares the light that n candidates predict at Q checks with the light there.
 
     All is irradiance: coefficients times λ_l, so that the sum of squares is the mean over all
     normals, but for a factor. `powers` are the weights of eq. 16 before they are divided by their
@@ -135,17 +136,17 @@ class Prediction:
 
     @classmethod
     def of(
-        cls, evaluate: Evaluate, points: np.ndarray, probes: np.ndarray, exponent: float
+        cls, evaluate: Evaluate, points: np.ndarray, checks: np.ndarray, exponent: float
     ) -> "Prediction":
-        light = evaluate(np.concatenate([points, probes]))
-        wanted = (len(points) + len(probes),)
+        light = evaluate(np.concatenate([points, checks]))
+        wanted = (len(points) + len(checks),)
         if light.point.shape[:-1] != wanted:
             raise ValueError(f"expected expansions {wanted}, got {light.point.shape[:-1]}")
         around = jax.tree.map(lambda leaf: leaf[: len(points), None], light)
-        said = extrapolate(around, jnp.asarray(probes, light.terms.dtype)[None])
+        said = extrapolate(around, jnp.asarray(checks, light.terms.dtype)[None])
         exact = light.coefficients[len(points) :]
-        squared = np.sum((points[:, None].astype(float) - probes[None]) ** 2, axis=-1)
-        core = _CORE * np.linalg.norm(np.ptp(probes.astype(float), axis=0))
+        squared = np.sum((points[:, None].astype(float) - checks[None]) ** 2, axis=-1)
+        core = _CORE * np.linalg.norm(np.ptp(checks.astype(float), axis=0))
         squared = squared + max(core, np.finfo(float).tiny) ** 2
         powers = (squared.min(axis=0) / squared) ** (exponent / 2)
         return cls(_irradiance(said), _irradiance(exact), powers)
@@ -207,7 +208,7 @@ class Choice:
         return True
 
 
-def probes_of(positions: np.ndarray, count: int, seed: int) -> np.ndarray:
+def drawn_positions(positions: np.ndarray, count: int, seed: int) -> np.ndarray:
     """Draw some of the positions at random."""
     rows = np.random.default_rng(seed).permutation(len(positions))[:count]
     return positions[rows]
@@ -262,7 +263,7 @@ def update_samples(
     release: float | None = None,
     limit: int = 16,
     exponent: float = 6.0,
-    probes: int = 128,
+    checks: int = 128,
     seed: int = 0,
 ) -> Update:
     """Add samples where the error is above a target, or remove those that are not needed.
@@ -280,10 +281,10 @@ def update_samples(
       moved likewise.
     - `positions`: (V, 3), the object's vertices as they are now.
     - `evaluate`: the expansions of the light as it is now around points (n, 3). It is called
-      once, with the samples, the candidates and the probes.
+      once, with the samples, the candidates and the checks.
     - `target`, and `release` below it (half of it if not given): relative RMS errors.
     - `limit`: the most samples that may come of adding.
-    - `exponent`, `probes`, `seed`: as for `place_samples`.
+    - `exponent`, `checks`, `seed`: as for `place_samples`.
 
     **Returns** an `Update`. One sample always stays. Runs on the host; not differentiable.
 
@@ -310,7 +311,7 @@ def update_samples(
     if not 0 <= release < target:
         raise ValueError(f"expected 0 <= release < target, got {release} and {target}")
     pool = np.concatenate([points, candidates.astype(points.dtype)])
-    prediction = Prediction.of(evaluate, pool, probes_of(positions, probes, seed), exponent)
+    prediction = Prediction.of(evaluate, pool, drawn_positions(positions, checks, seed), exponent)
     choice = Choice(prediction, list(range(len(points))))
     if choice.error > target:
         while choice.error > target and len(choice.chosen) < operator.index(limit):

@@ -12,7 +12,7 @@ from jaxsh.midrange import (
     place_samples,
     update_samples,
 )
-from jaxsh.midrange._placement import Prediction, probes_of
+from jaxsh.midrange._placement import Prediction, drawn_positions
 
 
 def _light(points):
@@ -58,13 +58,13 @@ def test_farthest_covers_within_twice_the_best(rng):
 
 
 def test_predicted_error_is_that_of_the_blend(rng):
-    probes, points = rng.uniform(-0.5, 0.5, (20, 3)), rng.uniform(-0.5, 0.5, (3, 3))
-    found = Prediction.of(_light, points, probes, 4.0).error([0, 1, 2])[0]
-    weights = inverse_distance_weights(probes, points, exponent=4.0)
+    checks, points = rng.uniform(-0.5, 0.5, (20, 3)), rng.uniform(-0.5, 0.5, (3, 3))
+    found = Prediction.of(_light, points, checks, 4.0).error([0, 1, 2])[0]
+    weights = inverse_distance_weights(checks, points, exponent=4.0)
     # λ_l of the clamped cosine, by hand.
     lambdas = np.repeat([np.pi, 2 * np.pi / 3, np.pi / 4], [1, 3, 5])
-    blend = np.asarray(interpolate(_light(points), weights, probes)) * lambdas
-    exact = np.asarray(_light(probes).coefficients) * lambdas
+    blend = np.asarray(interpolate(_light(points), weights, checks)) * lambdas
+    exact = np.asarray(_light(checks).coefficients) * lambdas
     expected = np.linalg.norm(blend - exact) / np.linalg.norm(exact)
     assert found == pytest.approx(expected, rel=1e-3)  # the core around samples
 
@@ -77,15 +77,15 @@ def _error(points, x):
 @pytest.mark.slow
 def test_greedy_meets_its_target_with_few(rng):
     x = rng.uniform(-0.5, 0.5, (400, 3))
-    options = {"method": "greedy", "evaluate": _light, "candidates": 30, "probes": 100}
+    options = {"method": "greedy", "evaluate": _light, "candidates": 30, "checks": 100}
     alone = _error(place_samples(x, 1), x)
     points = place_samples(x, 12, target=alone / 4, **options)
     assert 1 < len(points) < 12
-    assert _error(points, x) < alone / 4 * 1.15  # probes are a part of the positions
+    assert _error(points, x) < alone / 4 * 1.15  # checks are a part of the positions
     fewer = place_samples(x, len(points) - 1, target=alone / 4, **options)
-    assert _error(fewer, probes_of(x, 100, 0)) > alone / 4
+    assert _error(fewer, drawn_positions(x, 100, 0)) > alone / 4
     # As many samples as clusters, no worse where it was looked.
-    greedy, looked = place_samples(x, 6, **options), probes_of(x, 100, 0)
+    greedy, looked = place_samples(x, 6, **options), drawn_positions(x, 100, 0)
     assert len(greedy) == 6
     assert _error(greedy, looked) <= _error(place_samples(x, 6), looked)
 

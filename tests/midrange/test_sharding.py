@@ -26,20 +26,21 @@ def expansions(rng):
     return midrange.Expansion(rng.normal(size=(5, 3)), rng.normal(size=(5, 3, 4, 4)))
 
 
-@pytest.mark.parametrize("options", [{}, {"horizon": UP, "blockers": [BLOCKER]}])
-def test_polygon_lights(points, options):
+def test_polygon_lights_above_a_horizon_behind_a_blocker(points):
     def light(points):
-        return midrange.polygon_harmonics_with_gradient(LIGHT, points, DEGREE, **options)
+        return midrange.polygon_harmonics_with_gradient(
+            LIGHT, points, DEGREE, horizon=UP, blockers=[BLOCKER]
+        )
 
     check_sharded(light, (points,), (ROWS,), (ROWS, ROWS))
 
 
 def test_a_polygon_light_s_value_and_reverse_mode(points):
     def light(points):
-        return midrange.polygon_harmonics(LIGHT, points, DEGREE)
+        value, pull = jax.vjp(lambda p: midrange.polygon_harmonics(LIGHT, p, DEGREE), points)
+        return value, *pull(value)
 
     check_sharded(light, (points,), (ROWS,), ROWS)
-    check_sharded(jax.grad(lambda points: light(points)[..., 1].sum()), (points,), (ROWS,), ROWS)
 
 
 def test_sphere_lights(points):
