@@ -10,7 +10,7 @@ from jaxtyping import Array, ArrayLike, Float, Int
 
 from .._core.checks import as_float
 from .._core.linalg import dot, einsum, matmul
-from .._core.xla import keep_rows
+from .._core.xla import keep_rows, on_mesh
 from ._basis import evaluate
 from ._indexing import degree_of, degrees, orders
 from ._tables import legendre
@@ -59,9 +59,9 @@ def dering(
     | `window("hann")` | 9.2–24.5 | 2.5–5.8 | 1.2–2.5 |
     | `dering(of="light")` | 2.3–27.6 | 1.5–32.2 | 0.8–32.3 |
 
-    By default one of the probes needs a window, grace at degree 2, and from degree 4 on none does;
-    their light then has negative parts of 2–30 % of its integral, which a diffuse surface does
-    not see. A light with one small bright source loses most by `of="light"`, at any degree.
+    By default four of the probes need a window at degree 1, one (grace) at degree 2 and none at 4,
+    6 and 10. The negative parts of their light are then 2–30 % of its integral, which a diffuse
+    surface does not see. Light with small bright sources loses most by `of="light"`, at any degree.
 
     **Example**
 
@@ -200,7 +200,9 @@ def _darkest(coefficients: Float[Array, " k"], degree: int) -> Float[Array, " 3"
 
 
 def _least(values: Float[Array, " n"], count: int) -> Int[Array, " count"]:
-    """Indices of the `count` least values, one after the other: `top_k` would gather a batch."""
+    """Indices of the least values; in turn on a mesh, where `top_k` would gather a batch."""
+    if not on_mesh(values):
+        return jax.lax.top_k(-values, count)[1]
     places = np.arange(len(values), dtype=np.int32)
 
     def take(values, _):
@@ -217,8 +219,9 @@ def _refine(
     dtype = coefficients.dtype
     u, v = np.meshgrid(*2 * [np.linspace(-1, 1, 9)])
     patch = jnp.asarray(np.stack([u.ravel(), v.ravel()], axis=-1), dtype)
-    chosen, values = np.arange(len(directions), dtype=np.int32), jnp.zeros(len(directions), dtype)
-    for scale in (reach, reach / 4, reach / 16):
+    chosen = np.arange(len(directions), dtype=np.int32)
+
+    def closer(directions, scale):
         # Any two directions that span the tangent plane will do.
         axis = jnp.eye(3, dtype=dtype)[jnp.argmin(jnp.abs(directions), axis=-1)]
         side = jnp.cross(directions, axis)
@@ -229,8 +232,11 @@ def _refine(
         basis = evaluate(nearby, degree, axis=0)
         samples = einsum("k,kvp->vp", coefficients, basis)
         best = jnp.argmin(samples, axis=-1)
-        directions, values = nearby[chosen, best], samples[chosen, best]
-    return directions, values
+        return nearby[chosen, best], samples[chosen, best]
+
+    scales = jnp.asarray([reach, reach / 4, reach / 16], dtype)
+    directions, values = jax.lax.scan(closer, directions, scales)
+    return directions, values[-1]
 
 
 def _band_sums(terms: Float[Array, " k"], degree: int) -> Float[Array, " bands"]:

@@ -191,5 +191,5 @@ def test_second_derivatives_of_short_and_long_vectors_in_float32(exponent):
 
 def test_debug_nans_finds_none():
     with jax.debug_nans(True):
-        jacobians(POINTS, 3)
-        harmonics.evaluate_with_gradient(POINTS, 3)
+        jacobians(POINTS, 13)  # the programs of `test_gradient_four_ways`
+        harmonics.evaluate_with_gradient(POINTS, 13)
