@@ -7,19 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..runner import Context, Table, experiment
-from .methods import (
-    METHODS,
-    Method,
-    adaptive_way,
-    baselines,
-    color,
-    lights,
-    rival,
-    seconds,
-    truncations,
-    warm,
-    worst_turns,
-)
+from . import methods as frame
 from .plots import draw_exponents
 from .scenes import One, Scene
 
@@ -27,7 +15,7 @@ from .scenes import One, Scene
 @dataclasses.dataclass(frozen=True)
 class Exponent(One):
     degree: int = 4
-    methods: tuple[Method, ...] = METHODS
+    methods: tuple[frame.Method, ...] = frame.METHODS
     exponents: tuple[float, ...] = (8.0, 32.0, 1000.0)
 
     def __post_init__(self):
@@ -52,14 +40,14 @@ def exponent(config: Exponent, context: Context) -> list[Table]:
 def _rows(
     config: Exponent, context: Context, scene: Scene, value: float
 ) -> Iterator[dict[str, Any]]:
-    adaptive = {method: adaptive_way(scene, method) for method in config.methods}
-    lower = truncations(scene)
-    ways = baselines(scene) | adaptive | lower
-    first = warm(context, f"exponent {value:g}", ways, scene.light)
-    times = seconds(ways, lights(scene, config.frames))
+    adaptive = {method: frame.adaptive_way(scene, method) for method in config.methods}
+    lower = frame.truncations(scene)
+    ways = frame.baselines(scene) | adaptive | lower
+    first = frame.warm(context, f"exponent {value:g}", ways, scene.light)
+    times = frame.seconds(ways, frame.lights(scene, config.frames))
     reference = first["full"]
     truncated = {name: scene.quality(first[name], reference) for name in lower}
-    turned = worst_turns(scene, ways["full"], adaptive)
+    turned = frame.worst_turns(scene, ways["full"], adaptive)
     for method in adaptive:
         result, spent = first[method], times[method]
         line = {
@@ -72,6 +60,6 @@ def _rows(
         line["kept"] = None
         if "specular" in result.active_fraction:
             line["kept"] = float(np.ravel(np.asarray(result.active_fraction["specular"]))[-1])
-        line |= scene.quality(color(result), reference).named()
+        line |= scene.quality(frame.color(result), reference).named()
         line["psnr_turned"] = turned[method]
-        yield line | rival(spent, times, truncated)
+        yield line | frame.rival(spent, times, truncated)

@@ -8,26 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..runner import Context, Table, experiment
-from .methods import (
-    DIFFUSE,
-    EIGHT_BITS,
-    METHODS,
-    STILL,
-    Method,
-    adaptive_way,
-    baselines,
-    color,
-    diffuse,
-    lights,
-    matmul,
-    product_flops,
-    rival,
-    seconds,
-    still,
-    truncations,
-    warm,
-    worst_turns,
-)
+from . import methods as frame
 from .moving import moving
 from .scenes import PAPER, Row, Scene, Scenes, rows_or_default
 from .table1_report import GAIN, tables
@@ -37,7 +18,7 @@ from .table1_report import GAIN, tables
 class Table1:
     rows: tuple[tuple[str, str, int], ...] = ()
     """environment, mesh and degree of each row; none means the first of the data, at degree 4"""
-    methods: tuple[Method, ...] = METHODS
+    methods: tuple[frame.Method, ...] = frame.METHODS
     frames: int = 9
     """frames of each way, in turns"""
     directions: int = 2048
@@ -73,25 +54,25 @@ def _one_per_mesh(rows: Sequence[Row]) -> list[Row]:
 
 
 def _scene(config: Table1, context: Context, scene: Scene) -> Iterator[dict[str, Any]]:
-    adaptive = {method: adaptive_way(scene, method) for method in config.methods}
-    lower = truncations(scene)
-    multiply, operations = matmul()
-    ways = baselines(scene) | still(scene) | diffuse(scene) | adaptive | lower
+    adaptive = {method: frame.adaptive_way(scene, method) for method in config.methods}
+    lower = frame.truncations(scene)
+    multiply, operations = frame.matmul()
+    ways = frame.baselines(scene) | frame.still(scene) | frame.diffuse(scene) | adaptive | lower
     ways |= {"matmul": multiply}
     label = " ".join(map(str, scene.row))
-    first = warm(context, label, ways, scene.light)
-    times = seconds(ways, context.progress(lights(scene, config.frames), label))
+    first = frame.warm(context, label, ways, scene.light)
+    times = frame.seconds(ways, context.progress(frame.lights(scene, config.frames), label))
     reference = first["full"]
     quality = {
-        name: scene.quality(color(result), reference)
+        name: scene.quality(frame.color(result), reference)
         for name, result in first.items()
-        if name not in ("matmul", DIFFUSE, EIGHT_BITS)
+        if name not in ("matmul", frame.DIFFUSE, frame.EIGHT_BITS)
     }
-    rounded = reference + first[EIGHT_BITS] - first[DIFFUSE]
+    rounded = reference + first[frame.EIGHT_BITS] - first[frame.DIFFUSE]
     where = scene.row._asdict()
     vertices, coefficients = scene.baked.coefficients.shape
     rate = operations / times["matmul"]
-    flops = product_flops(vertices, coefficients)
+    flops = frame.product_flops(vertices, coefficients)
     about = where | {
         "vertices": vertices,
         "coefficients": coefficients,
@@ -101,14 +82,14 @@ def _scene(config: Table1, context: Context, scene: Scene) -> Iterator[dict[str,
         "full_to_einsum": times["einsum"] / times["full"],
         "largest_difference": max(
             float(jnp.max(jnp.abs(first[name] - reference)))
-            for name in ("einsum", "product form", STILL)
+            for name in ("einsum", "product form", frame.STILL)
         ),
     }
-    about |= {f"fps {name}": 1 / times[name] for name in (*GAIN, STILL, *adaptive)}
-    about["still_gain"] = times["full"] / times[STILL]
-    about |= {f"{name}, ms": 1e3 * times[name] for name in (DIFFUSE, EIGHT_BITS)}
+    about |= {f"fps {name}": 1 / times[name] for name in (*GAIN, frame.STILL, *adaptive)}
+    about["still_gain"] = times["full"] / times[frame.STILL]
+    about |= {f"{name}, ms": 1e3 * times[name] for name in (frame.DIFFUSE, frame.EIGHT_BITS)}
     about["psnr_eight_bits"] = scene.quality(rounded, reference).object
-    lighter = times["full"] - times[DIFFUSE] + times[EIGHT_BITS]
+    lighter = times["full"] - times[frame.DIFFUSE] + times[frame.EIGHT_BITS]
     if "masks" in adaptive:
         kept = first["masks"].active_fraction
         about |= {
@@ -118,7 +99,7 @@ def _scene(config: Table1, context: Context, scene: Scene) -> Iterator[dict[str,
         about["filtered_specular_mean"] = 1 - float(np.mean(np.asarray(kept["specular"])))
     yield about | _paper(scene.row)
     truncated = {name: quality[name] for name in lower}
-    turned = worst_turns(scene, ways["full"], adaptive)
+    turned = frame.worst_turns(scene, ways["full"], adaptive)
     for method in adaptive:
         spent = times[method]
         line = where | {
@@ -128,7 +109,7 @@ def _scene(config: Table1, context: Context, scene: Scene) -> Iterator[dict[str,
         }
         line |= {key: times[name] / spent for name, key in GAIN.items()}
         line["gain_eight_bits"] = lighter / spent
-        line |= quality[method].named() | rival(spent, times, truncated)
+        line |= quality[method].named() | frame.rival(spent, times, truncated)
         line["psnr_turned"] = turned[method]
         paper = PAPER.get(scene.row)
         if paper and method in ("masks", "levels"):

@@ -6,17 +6,8 @@ from typing import Any
 
 from ..runner import Context, Table, experiment
 from ..shared.tables import named
+from . import methods as frame
 from .columns import IN_FULL, per_method
-from .methods import (
-    Method,
-    adaptive_way,
-    baselines,
-    color,
-    lights,
-    seconds,
-    warm,
-    worst_turns,
-)
 from .plots import draw_degrees
 from .scenes import One, Row, Scene
 
@@ -42,7 +33,7 @@ _FULL = "einsum", "product form", "full"
 @dataclasses.dataclass(frozen=True)
 class Table2(One):
     degrees: tuple[int, ...] = (2, 3, 4, 5)
-    methods: tuple[Method, ...] = ("levels", "two_stage", "probes", "tiles")
+    methods: tuple[frame.Method, ...] = ("levels", "two_stage", "probes", "tiles")
     frames: int = 5
     """frames of each way, in turns"""
 
@@ -72,15 +63,17 @@ def table2(config: Table2, context: Context) -> list[Table]:
 def _degree(config: Table2, context: Context, scene: Scene) -> Iterator[dict[str, Any]]:
     """A row of the frames, then one of each method's gains and errors."""
     degree = scene.row.degree
-    ways = baselines(scene) | {name: adaptive_way(scene, name) for name in config.methods}
-    first = warm(context, f"degree {degree}", ways, scene.light)
-    times = seconds(ways, lights(scene, config.frames))
+    ways = frame.baselines(scene) | {
+        name: frame.adaptive_way(scene, name) for name in config.methods
+    }
+    first = frame.warm(context, f"degree {degree}", ways, scene.light)
+    times = frame.seconds(ways, frame.lights(scene, config.frames))
     about = {"degree": degree, "coefficients": (degree + 1) ** 2}
     frames = about | {f"fps {name}": 1 / spent for name, spent in times.items()}
-    turned = worst_turns(scene, ways["full"], {name: ways[name] for name in config.methods})
+    turned = frame.worst_turns(scene, ways["full"], {name: ways[name] for name in config.methods})
     methods = []
     for method in config.methods:
-        quality = scene.quality(color(first[method]), first["full"])
+        quality = scene.quality(frame.color(first[method]), first["full"])
         line = about | {"method": method} | quality.named() | {"psnr_turned": turned[method]}
         line |= {f"gain {name}": times[name] / times[method] for name in _FULL}
         methods.append(line)

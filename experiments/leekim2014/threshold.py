@@ -7,15 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..runner import Context, Table, experiment
-from .methods import (
-    THRESHOLD,
-    adaptive_way,
-    baselines,
-    color,
-    lights,
-    seconds,
-    warm,
-)
+from . import methods as frame
 from .plots import draw_thresholds
 from .scenes import One, Row, Scene
 
@@ -61,22 +53,22 @@ def threshold(config: Threshold, context: Context) -> list[Table]:
 
 
 def _rows(config: Threshold, context: Context, scene: Scene) -> Iterator[dict[str, Any]]:
-    full = baselines(scene)
-    turning = lights(scene, config.frames)
+    full = frame.baselines(scene)
+    turning = frame.lights(scene, config.frames)
     for method in config.methods:
         for variant in context.progress((_PLAIN, *config.variants), method):
             options = {} if variant == _PLAIN else _VARIANTS[variant]
             ways = {
-                f"{limit}": adaptive_way(
+                f"{limit}": frame.adaptive_way(
                     scene, method, threshold=limit, diffuse_threshold=limit / 2, **options
                 )
                 for limit in config.thresholds
             }
-            first = warm(context, f"{method}, {variant}", full | ways, scene.light)
-            times = seconds(full | ways, turning)
+            first = frame.warm(context, f"{method}, {variant}", full | ways, scene.light)
+            times = frame.seconds(full | ways, turning)
             for limit in config.thresholds:
                 result, spent = first[f"{limit}"], times[f"{limit}"]
-                quality = scene.quality(color(result), first["full"])
+                quality = scene.quality(frame.color(result), first["full"])
                 yield {
                     "method": method,
                     "variant": variant,
@@ -95,7 +87,7 @@ def _tables(config: Threshold, rows: list[dict[str, Any]], row: Row) -> Iterator
         rows=rows,
         values={"row": row},
     )
-    limit = min(config.thresholds, key=lambda one: abs(one - THRESHOLD))
+    limit = min(config.thresholds, key=lambda one: abs(one - frame.THRESHOLD))
     choices = list(effects(rows, limit))
     if choices:
         yield Table(

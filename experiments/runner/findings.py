@@ -64,9 +64,8 @@ def _filled(template: Path, known: Mapping[str, str], results: Path, preset: str
 
 
 def _about(run: Mapping[str, Any]) -> str:
-    names = [
-        f"{name} {run['versions'][name]}" for name in ("jaxsh", "jax") if run["versions"][name]
-    ]
+    versions = {name: run["versions"][key] for name, key in (("jaxsh", "jaxsh"), ("JAX", "jax"))}
+    names = [f"{name} {version}" for name, version in versions.items() if version]
     data = run["data"] if run["data"].startswith("the ") else "a data folder"
     return ", ".join([run["date"][:10], *names, run["dtype"], data])
 
