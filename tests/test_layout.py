@@ -33,23 +33,6 @@ DOORS = {"harmonics._tables", "transfer._glossy_kernels"}
 # First words of a docstring that hide its verb.
 VAGUE = {"of", "what", "that", "those", "as", "which", "whether", "how", "where", "with", "from"}
 
-# Modules whose docstrings are being mended: a list that only shrinks.
-MENDED = {
-    "adaptive",
-    "geometry",
-    "harmonics",
-    "imaging",
-    "inverse",
-    "plot",
-    "sky",
-    "sphere",
-    "transfer",
-}
-EXAMPLES_TO_MEND = set(jaxsh.__all__) - MENDED
-OPENINGS_TO_MEND = set(jaxsh.__all__) - MENDED
-# Files that state a precision though `_core/linalg.py` is the place for it.
-PRECISION_TO_MEND: set[str] = set()
-
 
 def imported(path: Path, source: str = "") -> Iterator[tuple[str, list[str]]]:
     """Each `from … import …` and `import …` of a file: an absolute name, and what is taken."""
@@ -151,7 +134,7 @@ def test_precision_has_one_switch():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and "precision" in {one.arg for one in node.keywords}:
                 found.add(short(path))
-    assert found - PRECISION_TO_MEND <= {"jaxsh/_core/linalg.py"}
+    assert found <= {"jaxsh/_core/linalg.py"}
 
 
 def public() -> Iterator[tuple[str, object]]:
@@ -174,7 +157,7 @@ def test_public_docstrings_open_with_what_they_do():
         for name, thing in public()
         if not (doc := inspect.getdoc(thing)) or first_word(doc) in VAGUE
     }
-    assert not {name for name in found if name.split(".")[0] not in OPENINGS_TO_MEND}
+    assert found == set()
 
 
 def test_private_docstrings_do_too():
@@ -184,9 +167,7 @@ def test_private_docstrings_do_too():
         for node in ast.walk(tree):
             kinds = ast.Module, ast.FunctionDef, ast.ClassDef
             doc = ast.get_docstring(node) if isinstance(node, kinds) else None
-            if path.relative_to(ROOT).parts[1] in OPENINGS_TO_MEND or not doc:
-                continue
-            if first_word(doc) in VAGUE:
+            if doc and first_word(doc) in VAGUE:
                 name = getattr(node, "name", "the file")
                 found.add(f"{short(path)}: {name}: {doc.splitlines()[0]}")
     assert found == set()
@@ -194,7 +175,7 @@ def test_private_docstrings_do_too():
 
 def test_public_docstrings_hold_an_example_that_runs():
     found = {name for name, thing in public() if ">>> " not in (inspect.getdoc(thing) or "")}
-    assert not {name for name in found if name.split(".")[0] not in EXAMPLES_TO_MEND}
+    assert found == set()
 
 
 def test_files_are_of_a_length_to_read():
