@@ -1,6 +1,5 @@
 """Lee and Kim's filter: with every vertex under a mask, and compacted."""
 
-import dataclasses
 import operator
 from typing import Literal
 
@@ -86,10 +85,6 @@ class AbstractFilter(AbstractMethod):
         if {"diffuse", "specular"} - set(shown) or any(len(one) != count for one in shown.values()):
             raise ValueError(f"expected previous as a result of this method for {count} vertices")
         return {name: jnp.asarray(one) for name, one in shown.items()}
-
-    def follow(self, previous: AdaptiveResult) -> "AbstractFilter":
-        """Return the method with the frame before, for `hysteresis`."""
-        return dataclasses.replace(self, previous=previous)
 
 
 class Masks(AbstractFilter):

@@ -1,5 +1,9 @@
 """All methods through one door."""
 
+import dataclasses
+
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_masks import scene
@@ -68,6 +72,15 @@ def test_a_name_stands_for_the_defaults(rng):
     frame = scene(rng)
     named, typed = (adaptive.shade(*frame, way) for way in ("two_stage", adaptive.TwoStage()))
     np.testing.assert_array_equal(named.color, typed.color)
+
+
+def test_methods_are_trees(rng):
+    light, made, eye, material = scene(rng)
+    frame = light, adaptive.stage(made), jnp.asarray(eye), material
+    method = adaptive.TwoStage(threshold=0.15)
+    plain, jitted = adaptive.shade(*frame, method), jax.jit(adaptive.shade)(*frame, method)
+    np.testing.assert_allclose(jitted.color, plain.color, rtol=0, atol=1e-12)
+    assert dataclasses.replace(method, threshold=0.2).base == 2
 
 
 def test_forms_that_a_method_cannot_take_are_refused(unchecked, rng):
