@@ -117,10 +117,10 @@ def preetham_table(table: Table, degree: int = 6) -> SkyFit:
     (6, (3, 28, 12, 6), 'turbidity')
     """
     axes = stored_axes(table)
-    coefficients, _ = _stored()[table]
-    return SkyFit(jnp.asarray(coefficients), jnp.asarray(MIX), axes, True, prefactor).truncated(
-        degree
-    )
+    # With their type said: JAX 0.10 keeps what it made of a NumPy array in a trace without x64,
+    # and gives that float32 again where x64 is on.
+    values, mix = (jnp.asarray(a, jnp.result_type(a)) for a in (_stored()[table][0], MIX))
+    return SkyFit(values, mix, axes, True, prefactor).truncated(degree)
 
 
 def stored_axes(table: Table) -> tuple[Axis, ...]:

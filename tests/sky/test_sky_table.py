@@ -116,6 +116,17 @@ def test_the_script_writes_what_the_package_reads(tool, tmp_path):
             np.testing.assert_array_equal(made[name], stored[name])
 
 
+def test_a_trace_without_x64_leaves_float64_its_digits(tool):
+    with jax.enable_x64(False):
+        sun = np.array([0.6, 0, 0.8], np.float32)
+        sky.preetham_harmonics(sun, np.float32(3), 1, table="precise")
+    fit = sky.preetham_table("precise")
+    with np.load(tool.OUTPUT) as stored:
+        np.testing.assert_array_equal(fit.coefficients, stored["precise"])
+    mix = sky.xyz_to_srgb() @ np.array([[1.0, 0, 0], [0, 1, 0], [-1, -1, 1]])
+    np.testing.assert_array_equal(fit.mix, mix)
+
+
 def test_a_lower_degree_is_its_first_bands():
     sun = sun_at(30, 70)
     whole = sky.preetham_harmonics(sun, 3.0)
