@@ -16,7 +16,7 @@ _YELLOW = (1.0, 0.75, 0.05)
 def glass(
     view: View, camera: imaging.Camera, points: Float[np.ndarray, "s 3"], *, samples: int = 1
 ) -> Float[np.ndarray, "h w 3"]:
-    """The object in grey, lit from the camera, and the points as if it were of glass."""
+    """The object in gray, lit from the camera, and the points as if it were of glass."""
     ball = trimesh.creation.icosphere(subdivisions=2, radius=_RADIUS)
     vertices = np.concatenate([ball.vertices + point for point in points])
     faces = np.concatenate([ball.faces + i * len(ball.vertices) for i in range(len(points))])
@@ -24,8 +24,8 @@ def glass(
     toward = camera.position - camera.target
     toward = (toward / jnp.linalg.norm(toward)).astype(view.mesh.normals.dtype)
     facing = jnp.clip(view.mesh.normals @ toward, 0, 1)[:, None]
-    grey = imaging.interpolate(view.raster, 0.02 + 0.25 * facing**2)
+    gray = imaging.interpolate(view.raster, 0.02 + 0.25 * facing**2)
     raster = imaging.rasterize(dots, camera, samples=samples)
-    color = jnp.broadcast_to(jnp.asarray(_YELLOW, grey.dtype), (len(dots.vertices), 3))
-    image = imaging.interpolate(raster, color, jnp.repeat(grey, 3, axis=-1))
+    color = jnp.broadcast_to(jnp.asarray(_YELLOW, gray.dtype), (len(dots.vertices), 3))
+    image = imaging.interpolate(raster, color, jnp.repeat(gray, 3, axis=-1))
     return np.asarray(imaging.tone_map(image))

@@ -63,11 +63,11 @@ def show_signed(
 
 
 def show_scale(axis: Axes, limit: float, label: str) -> None:
-    """The colours of `show_signed`, at the right of an axis that is otherwise empty."""
+    """The colors of `show_signed`, at the right of an axis that is otherwise empty."""
     axis.axis("off")
     scale = axis.inset_axes((0.82, 0.05, 0.06, 0.9))
-    colours = ScalarMappable(Normalize(-limit, limit), "RdBu_r")
-    plt.colorbar(colours, cax=scale, label=label, ticklocation="left")
+    colors = ScalarMappable(Normalize(-limit, limit), "RdBu_r")
+    plt.colorbar(colors, cax=scale, label=label, ticklocation="left")
 
 
 def frame(axis: Axes, title: str, color: str) -> None:

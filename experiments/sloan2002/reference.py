@@ -175,8 +175,8 @@ def one_bounce(
             light = pixels.directions(drawn, rng)
             cosine = np.maximum(np.einsum("ij,ij->i", normal[front], light), 0)
             seen = cosine * ~scene.occluded(origins, light)
-            colour = probe[drawn] / probe[drawn].sum(axis=1, keepdims=True)
-            arriving = seen[:, None] * colour * upto[-1]  # irradiance where the ray met the mesh
+            color = probe[drawn] / probe[drawn].sum(axis=1, keepdims=True)
+            arriving = seen[:, None] * color * upto[-1]  # irradiance where the ray met the mesh
             for channel in range(3):
                 sums = np.bincount(vertex[met], arriving[:, channel], len(normals))
                 # π/paths for the cosine's distribution, albedo/π for the reflection.

@@ -1,5 +1,6 @@
 """The command line: listing, refusals in one sentence, overrides, exit codes."""
 
+import ast
 import dataclasses
 import string
 import subprocess
@@ -171,3 +172,19 @@ def test_ctrl_c_stops_all_and_says_what_is_kept(toys):
     assert (code, stdout) == (130, "")
     assert f"rows kept: 1, in {toys.out / 'toy/quick.partial'}" in stderr
     assert "Traceback" not in stderr
+
+
+def test_papers_import_what_is_shared_and_public_names_alone():
+    """A paper's folder imports the runner and what is shared, never another paper or a file of
+    jaxsh's own; what is shared imports the runner, which imports neither.
+    """
+    below = {"runner": set(), "shared": {"runner"}}
+    for path in (ROOT / "experiments").glob("*/*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.ImportFrom) or node.module is None:
+                continue
+            names = node.module.split(".")
+            if node.level == 2:
+                assert names[0] in below.get(path.parent.name, {"runner", "shared"}), path
+            if names[0] == "jaxsh":
+                assert not any(name.startswith("_") for name in names), path
