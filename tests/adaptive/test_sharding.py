@@ -71,7 +71,9 @@ def test_sets_are_made_of_one_device_s_arrays(frame):
     for make in (
         adaptive.stage,
         adaptive.make_anchors,
+        lambda made: adaptive.make_tiling(made, frame[2]),
         lambda made: adaptive.make_tiles(made, frame[2]),
+        lambda made: adaptive.arrange(made, adaptive.make_tiling(frame[1], frame[2])),
         lambda made: adaptive.make_tile_atlas(made, views=1),
     ):
         with pytest.raises(ValueError, match="gathers vertices from all over the mesh"):

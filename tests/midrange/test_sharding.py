@@ -123,3 +123,11 @@ def test_shading(points, expansions, rng):
         return many, midrange.shade(one, baked, 0.5)
 
     check_sharded(shade, (baked, expansions), (ROWS, WHOLE), ROWS)
+
+
+def test_expansions_made_and_their_monomials(rng, points):
+    coefficients, gradient = rng.normal(size=(8, 3, 4)), rng.normal(size=(8, 3, 4, 3))
+    check_sharded(midrange.make_expansion, (points, coefficients, gradient), (ROWS,) * 3, ROWS)
+    monomials = lambda offsets: midrange.monomials(offsets, 2)  # noqa: E731
+    check_sharded(monomials, (points,), (ROWS,), ROWS)
+    check_sharded(jax.grad(lambda o: monomials(o).sum()), (points,), (ROWS,), ROWS)

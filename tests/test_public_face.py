@@ -1,0 +1,65 @@
+"""Every public function of arrays is tried on a mesh of devices, or has a reason not to be."""
+
+import ast
+import importlib
+import inspect
+from pathlib import Path
+
+import pytest
+
+import jaxsh
+
+TESTS = Path(__file__).parent
+NO_ARRAYS = "takes numbers or names, or reads or writes a file"
+HOST = "runs in NumPy on the host, as its docstring says"
+ONE = "takes one picture, camera or mesh: nothing in it is shared out"
+REASONS = {
+    "adaptive": {},
+    "geometry": {"ray_scene": HOST, "read_mesh": NO_ARRAYS},
+    "harmonics": dict.fromkeys(
+        ["degree_of", "degrees", "gaunt", "index", "num_coefficients", "orders", "window"],
+        NO_ARRAYS,
+    )
+    | {"legendre": HOST},
+    "imaging": {
+        "backdrop": ONE,
+        "read_environment": NO_ARRAYS,
+        "studio": NO_ARRAYS,
+        "write_image": NO_ARRAYS,
+    },
+    "midrange": {"grid_around": ONE, "place_samples": HOST, "update_samples": HOST},
+    "plot": dict.fromkeys(["bands", "light", "lobes"], HOST),
+    "sky": {
+        "c_header": NO_ARRAYS,
+        "habel2008_evaluate": HOST,
+        "habel2008_fit": NO_ARRAYS,
+        "habel2008_monomials": HOST,
+        "least_squares": HOST,
+        "preetham_constants": NO_ARRAYS,
+        "preetham_fit": NO_ARRAYS,
+        "xyz_to_srgb": NO_ARRAYS,
+    },
+    "sphere": dict.fromkeys(["cube_map", "fibonacci", "gauss_legendre", "lat_long"], NO_ARRAYS),
+    "transfer": {"bake": HOST, "load": NO_ARRAYS, "save": HOST},
+}
+
+
+def names_in(path: Path) -> set[str]:
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    attributes = {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+    return attributes | {node.id for node in nodes if isinstance(node, ast.Name)}
+
+
+@pytest.mark.parametrize("module", jaxsh.__all__)
+def test_every_public_function_is_tried_on_a_mesh_of_devices(module):
+    package = importlib.import_module(f"jaxsh.{module}")
+    public = {
+        name
+        for name in package.__all__
+        if callable(getattr(package, name)) and not inspect.isclass(getattr(package, name))
+    }
+    excused = set(REASONS.get(module, {}))
+    file = TESTS / module / "test_sharding.py"
+    tried = names_in(file) if file.exists() else set()
+    assert public - tried - excused == set()
+    assert excused <= public - tried  # no reason outlives its function, or its test
