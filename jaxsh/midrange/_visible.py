@@ -184,5 +184,5 @@ def clip_cone(loops: Arcs, cone: Arcs, turn: Array) -> Arcs:
 
     outward = scale(turn[None], cone.normal)
     planes = jnp.arange(new, dtype=jnp.int32), outward[:, None, None], cone.near[:, None, None]
-    # Room for the one more arc of each plane: a loop whose body is compiled once.
+    # Space for one more arc of each plane: a loop whose body is compiled once.
     return jax.lax.scan(cut, with_room(loops, new), planes)[0]
