@@ -198,7 +198,7 @@ def _row_by_row(row, basis: Float[Array, "k n"], *arguments):
         once = jax.checkpoint(row, prevent_cse=False)
         return jax.lax.map(lambda k: once(k, basis, *arguments), jnp.asarray(numbers))
 
-    # Checkpointed too: what it kept for reverse mode would be made room for on the CPU as well.
+    # Checkpointed too: what it kept for reverse mode would be given space for on the CPU as well.
     @functools.partial(jax.checkpoint, prevent_cse=False)
     def at_once(basis, *arguments):
         return jax.vmap(lambda k: row(k, basis, *arguments))(jnp.asarray(numbers))
