@@ -102,25 +102,20 @@ def _channel(parts, geometry):
 
 def _interpolated(tables, theta_sun, turbidity, albedo):
     """Ten numbers for each of three channels, every one an array of the suns' shape."""
+    # Sums, since a broadcast array would not be sharded as the others are.
+    zero = jnp.zeros_like(theta_sun + turbidity + albedo)
+    theta_sun, turbidity, albedo = theta_sun + zero, turbidity + zero, albedo + zero
     elevation = math.pi / 2 - theta_sun
     up = elevation > 0
     along = jnp.where(up, jnp.cbrt(jnp.where(up, elevation, 1) / (math.pi / 2)), 0)
     curve = [math.comb(5, k) * along**k * (1 - along) ** (5 - k) for k in range(6)]
     turbidity, albedo = jnp.clip(turbidity, 1, 10), jnp.clip(albedo, 0, 1)
     hats = [jnp.maximum(1 - jnp.abs(turbidity - k), 0) for k in range(1, 11)]
-    along, hats, albedo = (
-        jnp.stack(jnp.broadcast_arrays(*t), axis=-1) for t in (curve, hats, [1 - albedo, albedo])
-    )
-    along, hats, albedo = (
-        jnp.broadcast_to(t, (*_batch(along, hats, albedo), t.shape[-1]))
-        for t in (along, hats, albedo)
-    )
-    numbers = einsum("...t,...a,...e,taecp->cp...", hats, albedo, along, tables)
+    along, hats, albedo = (jnp.stack(t, axis=-1) for t in (curve, hats, [1 - albedo, albedo]))
+    weights = hats[..., None, None] * albedo[..., None, :, None] * along[..., None, None, :]
+    weights = weights.reshape(*zero.shape, -1)
+    numbers = einsum("...w,wcp->cp...", weights, tables.reshape(-1, *tables.shape[3:]))
     return [tuple(channel) for channel in numbers]
-
-
-def _batch(*arrays):
-    return jnp.broadcast_shapes(*(a.shape[:-1] for a in arrays))
 
 
 @read_only_cache(maxsize=None)
