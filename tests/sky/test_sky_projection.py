@@ -10,7 +10,7 @@ from second_derivation import project_by_panels
 from suns import sun_at, upper_directions
 
 from jaxsh import harmonics, sky
-from jaxsh.sky import _project as projection
+from jaxsh.sky import _project
 from jaxsh.sky._project import sky_grid, tanh_sinh
 
 ELEVATIONS = np.array([90, 89.9, 60, 30, 10, 1, 0.05, 1e-3, 0])
@@ -57,7 +57,9 @@ def test_twice_the_nodes_change_nothing(degree):
     @jax.jit
     def refined(sun, turbidity):
         return jax.lax.map(
-            lambda row: projection._integrate(model, degree, row[0], row[1:], symmetric=True, refine=2),
+            lambda row: _project._integrate(
+                model, degree, row[0], row[1:], symmetric=True, refine=2
+            ),
             (sun, turbidity),
         )
 
@@ -70,7 +72,7 @@ def test_a_sun_below_the_horizon_is_projected_as_well():
     """The antisolar point is then in the sky."""
     sun = sun_at(-3.0)
     model = functools.partial(sky.preetham_radiance, check="allow")
-    refined = projection._integrate(
+    refined = _project._integrate(
         model, 6, jnp.asarray(sun), (jnp.asarray(4.0),), symmetric=True, refine=2
     )
     found = sky.project_preetham(sun, 4.0, check="allow")
