@@ -78,9 +78,10 @@ def read_mesh(path: str | os.PathLike[str], *, up: Literal["z", "y"] = "z") -> M
                 f"it announces {announced[0]} vertices and {announced[1]} faces, "
                 f"but {len(vertices)} vertices and {len(faces)} triangles could be read"
             )
-    except ImportError:
-        raise
     except Exception as error:  # a parser may raise anything when a file is damaged
+        # trimesh looks for this package, which it does not require, in text that is not UTF-8.
+        if isinstance(error, ImportError) and error.name != "charset_normalizer":
+            raise
         reason = str(error).strip().split("\n")[0]
         raise ValueError(f"{path}: damaged or not a {suffix} file: {reason}") from error
     if up == "y":
