@@ -79,7 +79,8 @@ def vertex_normals(vertices: Float[Array, "v 3"], faces: Int[Array, "f 3"]) -> F
     Differentiable in the vertices, forward and reverse. Runs under `jit` and `vmap`. Faces may be
     shared out between devices, and poses along an axis in front by `vmap`; vertices may not, since
     a face names any of them: along explicit axes that raises `ValueError`, along automatic ones
-    XLA gathers them.
+    XLA gathers them. Reverse mode of poses along explicit axes needs JAX < 0.12, which can transpose
+    the gather; automatic axes serve above.
 
     **Example**
 
@@ -102,7 +103,9 @@ def _vertex_normals(vertices, faces):
     points = vertices / _largest(vertices)
     corners = points[faces]
     areas = jnp.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sums = jnp.zeros_like(points).at[faces].add(areas[:, None])
+    # Zeros that are sharded as the points are: under `vmap` JAX >= 0.12 asks for that.
+    zeros = jnp.where(jnp.zeros_like(points, dtype=bool), points, jnp.zeros_like(points))
+    sums = zeros.at[faces].add(areas[:, None])
     sums = sums / _largest(sums, axis=-1)
     squared = jnp.sum(sums * sums, axis=-1, keepdims=True)
     has_normal = squared > 0
