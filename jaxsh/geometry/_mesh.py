@@ -79,7 +79,7 @@ def vertex_normals(vertices: Float[Array, "v 3"], faces: Int[Array, "f 3"]) -> F
     Differentiable in the vertices, forward and reverse. Runs under `jit` and `vmap`. Faces may be
     shared out between devices, and poses along an axis in front by `vmap`; vertices may not, since
     a face names any of them: along explicit axes that raises `ValueError`, along automatic ones
-    XLA gathers them. Reverse mode of poses along explicit axes needs JAX < 0.12, which can transpose
+    XLA gathers them. Reverse mode of poses along explicit axes needs JAX < 0.12, which transposes
     the gather; automatic axes serve above.
 
     **Example**
