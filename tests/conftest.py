@@ -18,6 +18,7 @@ import jax
 import jaxtyping
 import numpy as np
 import pytest
+import sharding
 
 jax.config.update("jax_num_cpu_devices", 2)  # for the tests of sharding
 jax.config.update("jax_enable_x64", True)
@@ -45,3 +46,17 @@ def unchecked():
     jaxtyping.config.update("jaxtyping_disable", True)
     yield
     jaxtyping.config.update("jaxtyping_disable", False)
+
+
+def pytest_generate_tests(metafunc):
+    """Tries what calls `check_sharded` on one kind of mesh a test, two of the three as slow tests."""
+    if "check_sharded" in metafunc.function.__code__.co_names:
+        metafunc.fixturenames.append("kind_of_mesh")
+        slow = [pytest.param(kind, marks=pytest.mark.slow) for kind in sharding.kinds[1:]]
+        metafunc.parametrize("kind_of_mesh", [sharding.kinds[0], *slow], indirect=True)
+
+
+@pytest.fixture
+def kind_of_mesh(request, monkeypatch):
+    """The one kind of mesh that `check_sharded` tries in this test."""
+    monkeypatch.setattr(sharding, "kinds", (request.param,))

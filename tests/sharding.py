@@ -1,7 +1,7 @@
 """What every public function of arrays promises on a mesh of devices."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import numpy as np
@@ -10,6 +10,10 @@ from jax.sharding import PartitionSpec as P
 
 ROWS = P("rows")  # for an array whose leading axis is shared out; P(None, "rows") for the second
 WHOLE = P()  # for one that each device holds in full
+
+Kind = Literal["explicit", "auto", "shard_map"]
+# The kinds that `check_sharded` tries; set by the fixture `kind_of_mesh`, one for each test.
+kinds: tuple[Kind, ...] = ("explicit", "auto", "shard_map")
 
 
 def check_sharded(
@@ -25,28 +29,31 @@ def check_sharded(
 
     `specs` and `out` are prefix pytrees of PartitionSpecs, one for each argument and for the
     result. Arguments that are not arrays (Python numbers, strings, None) belong into `function`.
-    It is tried with automatic axes, with explicit ones and inside `shard_map`; there each device
-    has its own rows only, so that a sum over them needs its `psum`: `mapped` is the function with
-    it, True for the function itself, or False for what makes no sense there.
+    It is tried with explicit axes, with automatic ones and inside `shard_map` (the last two in the
+    slow tests). Inside, each device has its own rows only, so that a sum over them needs its
+    `psum`: `mapped` is the function with it, True for the function itself, or False for what makes
+    no sense there.
     """
     plain = jax.jit(function)(*arguments)
-    for kind in (AxisType.Auto, AxisType.Explicit):
-        mesh = jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+    for kind in kinds:
+        axes = AxisType.Auto if kind == "auto" else AxisType.Explicit
+        mesh = jax.make_mesh((2,), ("rows",), axis_types=(axes,))
         placed = tuple(
             jax.device_put(argument, _shardings(mesh, spec, argument))
             for argument, spec in zip(arguments, specs, strict=True)
         )
+        if kind == "shard_map":
+            if mapped is not False:
+                body = function if mapped is True else mapped
+                inside = jax.shard_map(body, mesh=mesh, in_specs=specs, out_specs=out)
+                _check_close(jax.jit(inside)(*placed), plain, rtol, kind)
+            continue
         compiled = jax.jit(function).lower(*placed).compile()
         result = compiled(*placed)
         _check_placed(result, _shardings(mesh, out, result), kind)
         _check_close(result, plain, rtol, kind)
         gathered = [line for line in compiled.as_text().splitlines() if " all-gather" in line]
         assert not gathered, f"{kind} axes: {gathered[0].strip()}"
-        if mapped is False or kind is AxisType.Auto:  # all axes are manual inside: once is enough
-            continue
-        body = function if mapped is True else mapped
-        inside = jax.shard_map(body, mesh=mesh, in_specs=specs, out_specs=out)
-        _check_close(jax.jit(inside)(*placed), plain, rtol, f"shard_map, {kind}")
 
 
 def _shardings(mesh, spec, tree):

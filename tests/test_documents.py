@@ -23,8 +23,16 @@ def blocks(page: Path) -> list[str]:
     return re.findall(r"^```python\n(.*?)^```", page.read_text("utf-8"), re.DOTALL | re.MULTILINE)
 
 
+def default_run(paths: list[Path], quick: set[str]) -> list:
+    """The paths as parameters, slow but for those that are quick."""
+    return [
+        pytest.param(path, id=path.stem, marks=() if path.stem in quick else pytest.mark.slow)
+        for path in paths
+    ]
+
+
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if blocks(page)], ids=lambda page: page.stem
+    "page", default_run([page for page in PAGES if blocks(page)], {"README", "harmonics"})
 )
 def test_blocks_run_in_order(page, tmp_path):
     """The blocks of a page share one namespace, in a fresh process: no x64, no strict promotion,
@@ -49,7 +57,7 @@ def test_blocks_run_in_order(page, tmp_path):
         assert np.ptp(shown.reshape(-1, 3), axis=0).min() > 0.5
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", default_run(NOTEBOOKS, {"02_light_a_mesh"}))
 def test_notebook(path):
     notebook = nbformat.read(path, as_version=4)
     # Raises with the cell and its error where one fails.

@@ -12,7 +12,9 @@ from jaxsh import adaptive
 from jaxsh.transfer import Material, quantize, sample, shade_diffuse, shade_glossy
 
 
-@pytest.mark.parametrize(("quantized", "tolerance"), [(False, 1e-11), (True, 6e-3)])
+@pytest.mark.parametrize(
+    ("quantized", "tolerance"), [(False, 1e-11), pytest.param(True, 6e-3, marks=pytest.mark.slow)]
+)
 def test_every_method_at_its_finest_is_the_full_computation(rng, quantized, tolerance):
     """`Masks` and `Levels` are so checked in `test_masks`."""
     light, made, eye, material = scene(rng)

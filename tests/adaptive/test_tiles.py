@@ -49,7 +49,9 @@ MATERIAL = transfer.Material(jnp.asarray(0.5), jnp.asarray([0.5, 0.3, 0.1]), jnp
 
 
 @pytest.mark.parametrize(
-    ("dtype", "tolerance"), [(jnp.float32, 2e-6), (jnp.float64, 1e-14)], ids=["float32", "float64"]
+    ("dtype", "tolerance"),
+    [pytest.param(jnp.float32, 2e-6, marks=pytest.mark.slow), (jnp.float64, 1e-14)],
+    ids=["float32", "float64"],
 )
 def test_tiles_are_exact_in_exact_directions(ball, light, dtype, tolerance):
     """At degree 3 there are 38, fewer than are taken."""

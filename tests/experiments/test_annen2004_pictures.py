@@ -70,6 +70,7 @@ def test_three_lights_on_a_mesh(run):
     assert "what the gradient gains" in (folder / "table.md").read_text()
 
 
+@pytest.mark.slow
 def test_moved_under_a_light(run):
     options = ["--directions", "16", "--size", "32", "--samples", "1", "--positions", "3"]
     folder, rows = run("figure4", *options, small=True)

@@ -113,7 +113,7 @@ def hessians(points, degree):
     "order",
     [
         "fwd-rev",
-        "rev-rev",
+        pytest.param("rev-rev", marks=pytest.mark.slow),
         pytest.param("fwd-fwd", marks=pytest.mark.slow),
         pytest.param("rev-fwd", marks=pytest.mark.slow),
     ],

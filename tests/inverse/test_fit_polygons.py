@@ -61,6 +61,7 @@ def test_cayley_rotates():
     np.testing.assert_allclose(slope, expected, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_recovers_two_lights_from_the_better_guess(baked, rng):
     """Without noise to the last digits, with it as far off as the fit itself says."""
     observed = shaded(baked, (LAMP.polygon, PANEL.polygon))

@@ -50,18 +50,22 @@ def test_how_good_the_papers_polynomial_is():
     assert 0.2 < 100 * error.mean.max() < 0.3
 
 
-def test_monomials_are_the_same_polynomial(full, small, rng):
+@pytest.mark.parametrize(
+    ("size", "error"), [("small", 1e-12), pytest.param("full", 1e-6, marks=pytest.mark.slow)]
+)
+def test_monomials_are_the_same_polynomial(size, error, request, rng):
     """In float64, to what the sum of monomials leaves: 1e-13 at degree (5, 3), 1e-6 at (13, 7)."""
-    for fit, error in ((small, 1e-12), (full, 1e-6)):
-        table = sky.habel2008_monomials(fit)
-        assert table.dtype == np.float64
-        assert (table[harmonics.orders(fit.degree) < 0] == 0).all()
-        for theta, tau in zip(*angles(rng, 10), strict=True):
-            expected = np.asarray(fit(sun_at(90 - np.degrees(theta)), tau))
-            found = slow_equation_1(table, theta, tau)
-            assert np.linalg.norm(found - expected) < error * np.linalg.norm(expected)
+    fit = request.getfixturevalue(size)
+    table = sky.habel2008_monomials(fit)
+    assert table.dtype == np.float64
+    assert (table[harmonics.orders(fit.degree) < 0] == 0).all()
+    for theta, tau in zip(*angles(rng, 10), strict=True):
+        expected = np.asarray(fit(sun_at(90 - np.degrees(theta)), tau))
+        found = slow_equation_1(table, theta, tau)
+        assert np.linalg.norm(found - expected) < error * np.linalg.norm(expected)
 
 
+@pytest.mark.slow
 def test_monomials_in_float32_are_useless(full):
     """At low sun and high turbidity, which is why fits are kept in Chebyshev polynomials."""
     table = sky.habel2008_monomials(full).astype("f4")
