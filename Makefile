@@ -14,6 +14,9 @@ PRESET ?= quick
 bin := $(VENV)/bin
 # loadfile: what one file has traced serves its other tests.
 PARALLEL ?= -n auto --dist loadfile
+# XLA's older code for loops on the CPU: it runs slower and compiles a third faster, which is most of
+# what tests do. The slow tests, test-all and a plain pytest run what users run.
+QUICK_COMPILE ?= --xla_cpu_use_fusion_emitters=false
 
 .PHONY: reproduce test test-slow test-all test-oldest test-minimal check docs package bench clean
 
@@ -45,7 +48,7 @@ reproduce: $(VENV)/installed
 	$(bin)/python -m experiments run first_light environment --preset $(PRESET)
 
 test: $(VENV)/installed
-	$(bin)/python -m pytest $(PARALLEL)
+	XLA_FLAGS="$(XLA_FLAGS) $(QUICK_COMPILE)" $(bin)/python -m pytest $(PARALLEL)
 
 test-slow: $(VENV)/installed
 	$(bin)/python -m pytest $(PARALLEL) -m slow

@@ -49,7 +49,7 @@ def unchecked():
 
 
 def pytest_generate_tests(metafunc):
-    """Tries what calls `check_sharded` on one kind of mesh a test, two of the three as slow tests."""
+    """Tries what calls `check_sharded` on one kind of mesh a test; two of the three are slow."""
     if "check_sharded" in metafunc.function.__code__.co_names:
         metafunc.fixturenames.append("kind_of_mesh")
         slow = [pytest.param(kind, marks=pytest.mark.slow) for kind in sharding.kinds[1:]]
