@@ -1,7 +1,7 @@
 # Two commands on a fresh machine with Python >= 3.11:
 #   make reproduce   the main job, on the embedded default (or JAXSH_DATA=folder)
-#   make test        the tests, without the slow ones, and the examples of the docstrings
-# Also: make test-slow, make test-all (both), make check (lint, types), make docs (the pages, built
+#   make test        the tests, without the slow ones
+# Also: make test-slow (those, and the docstrings' examples), make test-all (both), make check (lint, types), make docs (the pages, built
 # strictly), make test-oldest (the oldest JAX that is supported), make test-minimal (without the
 # packages that only some functions need), make package (wheel and sdist), make bench (beside the
 # peers), make clean.
@@ -50,9 +50,10 @@ reproduce: $(VENV)/installed
 test: $(VENV)/installed
 	flags=$$(XLA_FLAGS=$(QUICK_COMPILE) $(bin)/python -c "import jax; jax.devices()" 2> /dev/null \
 		&& echo $(QUICK_COMPILE) || true); \
-	XLA_FLAGS="$(XLA_FLAGS) $$flags" $(bin)/python -m pytest $(PARALLEL)
+	XLA_FLAGS="$(XLA_FLAGS) $$flags" $(bin)/python -m pytest $(PARALLEL) tests
 
 test-slow: $(VENV)/installed
+	$(bin)/python -m pytest $(PARALLEL) jaxsh
 	$(bin)/python -m pytest $(PARALLEL) -m slow
 
 test-all: $(VENV)/installed

@@ -114,6 +114,7 @@ def test_tiles_with_albedos_per_vertex(ball, light, rng):
     np.testing.assert_allclose(result.color, full, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_error_falls_with_the_directions(ball, light):
     material = transfer.Material(jnp.asarray(0.0), jnp.asarray(1.0), jnp.asarray(8.0))
     full = transfer.shade_glossy(light, ball, EYE, material)

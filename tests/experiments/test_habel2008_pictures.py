@@ -20,6 +20,7 @@ def run(tmp_path):
     return functools.partial(runs.run, tmp_path)
 
 
+@pytest.mark.slow
 def test_day(run):
     options = ["--frames", "3", "--sheet", "3", "--height", "32", "--samples", "1"]
     folder, rows = run(

@@ -14,7 +14,7 @@ from jaxsh.inverse._solve import triangle
 from jaxsh.midrange import Polygon, polygon_harmonics
 
 COUNT = 64
-KINDS = AxisType.Auto, AxisType.Explicit
+KINDS = AxisType.Explicit, pytest.param(AxisType.Auto, marks=pytest.mark.slow)
 
 
 @pytest.fixture
@@ -80,9 +80,7 @@ def test_colors(kind, lit):
     check(fit, kind, jnp.stack([p.radiance for p in lights]), seen(lit, lights), lit)
 
 
-@pytest.mark.parametrize(
-    "kind", [AxisType.Explicit, pytest.param(AxisType.Auto, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("kind", KINDS)
 def test_polygons(kind, lit):
     start = [lamp(-0.8, [1.0, 1.0, 1.0])]
     fit = lambda o, t: inverse.fit_polygons(o, t, 0.5, start, turn=False)  # noqa: E731

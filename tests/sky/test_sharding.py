@@ -70,6 +70,7 @@ def test_projection(sky_of):
     check_sharded(slopes, suns, (ROWS,) * 2, (ROWS, ROWS))
 
 
+@pytest.mark.slow
 def test_batches_of_two_axes(sky_of):
     """Suns by turbidities: one axis is shared out, and never made one with the other."""
     _, sun, turbidity = sky_of

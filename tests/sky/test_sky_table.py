@@ -172,6 +172,7 @@ def test_vmap_over_suns_and_turbidities():
     np.testing.assert_allclose(mapped(jnp.asarray(sun), jnp.asarray(turbidity)), grid, 0, 1e-12)
 
 
+@pytest.mark.slow
 def test_derivatives_by_finite_differences():
     """Of the exact projection: the fit's slope is right, not only its value."""
     suns, turbidity = sun_at(np.array([89.0, 30, 0.5, 90]), 50), np.full(4, 3.3)
