@@ -1,10 +1,10 @@
 # Two commands on a fresh machine with Python >= 3.11:
 #   make reproduce   the main job, on the embedded default (or JAXSH_DATA=folder)
 #   make test        the tests, without the slow ones
-# Also: make test-slow (those, and the docstrings' examples), make test-all (both), make check (lint, types), make docs (the pages, built
-# strictly), make test-oldest (the oldest JAX that is supported), make test-minimal (without the
-# packages that only some functions need), make package (wheel and sdist), make bench (beside the
-# peers), make clean.
+# Also: make test-slow (those, and the examples of the docstrings), make test-all (both), make check
+# (lint, types), make docs (the pages, built strictly), make test-oldest (the oldest JAX that is
+# supported), make test-minimal (without the packages that only some functions need), make package
+# (wheel and sdist), make bench (beside the peers), make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
