@@ -58,12 +58,11 @@ def check_sharded(
 
 def _shardings(mesh, spec, tree):
     """The prefix `spec`, broadcast to the leaves of `tree`."""
-    is_spec = lambda node: isinstance(node, P)  # noqa: E731
     return jax.tree.map(
         lambda one, part: jax.tree.map(lambda _: NamedSharding(mesh, one), part),
         spec,
         tree,
-        is_leaf=is_spec,
+        is_leaf=lambda node: isinstance(node, P),
     )
 
 

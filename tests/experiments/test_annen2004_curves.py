@@ -219,6 +219,7 @@ class TestIrradianceGradients:
             np.testing.assert_allclose(records.translation, translation, atol=1e-12)
             np.testing.assert_allclose(records.rotation, rotation, atol=1e-12)
 
+    @pytest.mark.slow
     def test_a_record_is_exact_at_its_own_place(self, light, rng):
         with jax.enable_x64(True):
             points = jnp.asarray(rng.uniform(-0.5, 0.5, (4, 3)))

@@ -134,6 +134,7 @@ def test_lights_of_the_scene_do_not_hide_each_other():
         assert lit(lights, jnp.asarray(point)) == sum(each)
 
 
+@pytest.mark.slow
 def test_each_light_is_brightest_and_grows_towards_itself():
     lights, at = three_lights(3.0, 1.0), jnp.asarray([0.2, -0.3, 0.4])
     expansion = exact_expansion(lights, at, 1)
