@@ -1,0 +1,1 @@
+"""Mesh files: one parser a format, each giving `Polygons`, and the writers."""
