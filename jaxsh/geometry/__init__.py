@@ -5,6 +5,7 @@ through JAX where there is no Embree, in float32; they take NumPy or JAX arrays 
 arrays back. Space is right-handed with z up.
 """
 
+from ._base_color import BaseColor
 from ._cast import JaxRayScene
 from ._embree import EmbreeRayScene, ray_scene
 from ._knot import knot
@@ -16,6 +17,7 @@ from ._trace import Trace, trace
 from ._tree import RayTree
 
 __all__ = [
+    "BaseColor",
     "EmbreeRayScene",
     "Hit",
     "JaxRayScene",

@@ -10,6 +10,7 @@ from jax import lax
 from jaxtyping import Array, Float, Int
 
 from .._core.xla import keep_rows, rows_are_split
+from ._base_color import BaseColor
 from ._clean import clean
 
 
@@ -32,6 +33,12 @@ class Mesh(eqx.Module):
     vertices: Float[Array, "v 3"]
     faces: Int[Array, "f 3"]
     normals: Float[Array, "v 3"]
+    uv: Float[Array, "v 2"] | None = None  # (0, 0) is the lower left of the picture
+    colors: Float[Array, "v 4"] | None = None  # linear RGBA
+    face_material: Int[Array, " f"] | None = None  # row of `materials`, -1 for none
+    materials: tuple[BaseColor, ...] = ()
+    # Taken off the file's coordinates, in float64: those are `vertices` + `origin`.
+    origin: tuple[float, float, float] = eqx.field(static=True, default=(0.0, 0.0, 0.0))
 
 
 def make_mesh(

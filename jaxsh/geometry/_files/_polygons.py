@@ -1,18 +1,11 @@
-"""What the parsers of all formats give: polygons as the file says them, before any cleaning."""
+"""Hold what the parsers of all formats give: polygons as the file says them, uncleaned."""
 
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Int
 
-
-class FileMaterial(NamedTuple):
-    """Holds the base color of a part of the surface: factor times texture, as the file says it."""
-
-    name: str = ""
-    factor: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)  # linear RGBA
-    texture: UInt8[np.ndarray, "h w 4"] | None = None  # sRGB-encoded, row 0 at v = 1 (the top)
-    double_sided: bool = False
+from .._base_color import BaseColor
 
 
 class Polygons(NamedTuple):
@@ -30,5 +23,5 @@ class Polygons(NamedTuple):
     uv: Float[np.ndarray, "c 2"] | None = None  # v upwards: (0, 0) is the lower left of the picture
     colors: Float[np.ndarray, "c 4"] | None = None  # RGBA in [0, 1], in the encoding of the file
     polygon_material: Int[np.ndarray, " p"] | None = None  # row of `materials`, -1 for none
-    materials: tuple[FileMaterial, ...] = ()
+    materials: tuple[BaseColor, ...] = ()
     found: tuple[str, ...] = ()  # phrases for the one warning: what was ignored, and how often

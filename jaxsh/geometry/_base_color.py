@@ -1,0 +1,29 @@
+"""The base color of a part of a surface."""
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Float, UInt8
+
+
+class BaseColor(eqx.Module):
+    """Holds the base color that a file gives to a part of the surface: factor times texture.
+
+    `factor` is linear RGBA. `texture`, if any, is the picture as stored: 8-bit sRGB with linear
+    alpha, shape (h, w, 4), its top row at v = 1. `double_sided` is what the file says of it.
+
+    **Example**
+
+    >>> from jaxsh import geometry
+    >>> geometry.BaseColor("brick", (0.5, 0.2, 0.1, 1.0)).double_sided
+    False
+    """
+
+    name: str = eqx.field(static=True, default="")
+    factor: Float[Array | np.ndarray, "4"] | tuple[float, float, float, float] = (
+        1.0,
+        1.0,
+        1.0,
+        1.0,
+    )
+    texture: UInt8[Array | np.ndarray, "h w 4"] | None = None
+    double_sided: bool = eqx.field(static=True, default=False)
