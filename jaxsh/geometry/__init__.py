@@ -8,6 +8,7 @@ arrays back. Space is right-handed with z up.
 from ._base_color import BaseColor
 from ._cast import JaxRayScene
 from ._embree import EmbreeRayScene, ray_scene
+from ._files._write import write_mesh
 from ._knot import knot
 from ._mesh import Mesh, make_mesh, vertex_normals
 from ._rays import Hit, RayScene
@@ -34,4 +35,5 @@ __all__ = [
     "topology",
     "trace",
     "vertex_normals",
+    "write_mesh",
 ]
