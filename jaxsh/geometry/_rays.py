@@ -6,6 +6,8 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from ._frame import Frame
+
 # One vector for each ray, or one for all of them.
 Vectors = Float[Array | np.ndarray, "n 3"] | Float[Array | np.ndarray, " 3"]
 
@@ -106,31 +108,40 @@ def limits_of(max_distance: Any, count: int) -> np.ndarray:
 
 
 def prepared(
-    origins: np.ndarray, directions: np.ndarray, part: slice
-) -> tuple[np.ndarray, np.ndarray]:
-    """Give one chunk as Embree wants it: contiguous float32, directions of unit length."""
-    start = np.ascontiguousarray(origins[part], np.float32)
+    origins: np.ndarray, directions: np.ndarray, part: slice, frame: Frame
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Give one chunk as Embree wants it: contiguous float32, directions of unit length.
+
+    Origins are in the frame. Those of far away are brought nearer: by how much, in the frame, is
+    the third array, None where there are none.
+    """
+    start = frame.into(origins[part])
     shared = directions.strides[0] == 0  # Embree's binding takes one row for all rays
     towards = directions[:1] if shared else directions[part]
     squared = _squared(towards)
     least, most = squared.min(), squared.max()
-    # Nearly always all is well, and sums show it: the slow path is exact about what is not.
-    if not (least > 1e-30 and most < 1e30 and np.isfinite(start.sum())):
-        towards = directions[part].astype(np.float64)
+    # Nearly always all is well, and extremes show it: the slow path is exact about what is not.
+    near = -frame.far <= start.min() and start.max() <= frame.far
+    if not (least > 1e-30 and most < 1e30 and near):
+        given, towards = origins[part], directions[part].astype(np.float64)
         largest = np.abs(towards).max(axis=1, keepdims=True)
-        bad = ~(np.isfinite(start).all(axis=1) & np.isfinite(largest[:, 0]) & (largest[:, 0] > 0))
+        bad = ~(np.isfinite(given).all(axis=1) & np.isfinite(largest[:, 0]) & (largest[:, 0] > 0))
         if bad.any():
             ray = int(bad.argmax())
             raise ValueError(
                 f"rays need finite origins and finite directions other than zero: ray "
-                f"{part.start + ray} starts at {start[ray].tolist()} towards "
+                f"{part.start + ray} starts at {given[ray].tolist()} towards "
                 f"{towards[ray].tolist()}"
             )
         towards = towards / largest
         squared = _squared(towards)
     if least < 1 - 1e-6 or most > 1 + 1e-6:  # else they are units already
         towards = towards / np.sqrt(squared)[:, None]
-    return start, np.ascontiguousarray(towards, np.float32)
+    towards = np.ascontiguousarray(towards, np.float32)
+    ahead = None
+    if not near:
+        start, ahead = frame.nearer(origins[part], np.broadcast_to(towards, start.shape))
+    return start, towards, ahead
 
 
 def _squared(vectors: np.ndarray) -> np.ndarray:

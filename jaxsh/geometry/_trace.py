@@ -1,6 +1,5 @@
 """Rays through a tree of boxes, in JAX: many lanes walk in step, each with a ray of its own."""
 
-import functools
 import math
 from typing import NamedTuple
 
@@ -65,7 +64,9 @@ def trace(
     """Find the first triangle that each ray meets, or with `first=False` any one (for shadows).
 
     The pure core of `JaxRayScene`, for use inside `jit` and `vmap`: nothing is checked, distances
-    are in lengths of the direction, and all is float32. `origins` and `directions` are (n, 3).
+    are in lengths of the direction, and all is float32. `origins` and `directions` are (n, 3),
+    directions of any length, origins in the coordinates of the meshes, wherever these lie and
+    however large they are; only origins of many thousand times their size lose digits.
     `count` rays are cast (default: all), the rest miss; it may be traced, so that one compiled
     program serves any number of rays. A ray with a zero or NaN direction misses.
 
@@ -97,10 +98,46 @@ def trace(
         return Trace(limits, jnp.zeros(0, jnp.int32), jnp.zeros((0, 3), jnp.float32))
     end = jnp.asarray(size if count is None else count, jnp.int32)
     # Lanes that take rays from one queue would gather shared-out rays on each device.
-    cast = _cast_apart if on_mesh(origins, directions) else _cast_in_lanes
-    cast = functools.partial(cast, first=first, lanes=min(lanes, size))
+    apart = on_mesh(origins, directions)
     like = origins if rows_are_split(origins) else directions
-    return keep_rows(cast, tree, origins, directions, limits, end, like=like, axis=0, out=0)
+
+    def within(tree: RayTree, origins, directions, limits, end) -> Trace:
+        center = tree.center.astype(origins.dtype)[None]
+        origins = (origins - center).astype(jnp.float32) * tree.scale
+        directions = directions.astype(jnp.float32)
+        length = _power_of_two(jnp.max(jnp.abs(directions), axis=1))
+        directions = directions / length[:, None]
+        limits = limits * tree.scale * length
+        found = cast(
+            tree, origins, directions, limits, first=first, count=end, lanes=lanes, apart=apart
+        )
+        return found._replace(distance=found.distance / tree.scale / length)
+
+    return keep_rows(within, tree, origins, directions, limits, end, like=like, axis=0, out=0)
+
+
+def cast(
+    tree: RayTree,
+    origins: Float[Array, "n 3"],
+    directions: Float[Array, "n 3"],
+    limits: Float[Array, " n"],
+    *,
+    first: bool | Bool[Array, ""],
+    count: Int[Array, ""] | int,
+    lanes: int,
+    apart: bool = False,
+) -> Trace:
+    """Cast float32 rays that are in the tree's frame, with directions of about unit length."""
+    one = _cast_apart if apart else _cast_in_lanes
+    end = jnp.asarray(count, jnp.int32)
+    return one(tree, origins, directions, limits, end, first=first, lanes=min(lanes, len(origins)))
+
+
+def _power_of_two(x: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Give the largest power of two up to x; 1 for zero, NaN and infinity."""
+    bits = lax.bitcast_convert_type(x, jnp.int32) & 0x7F800000
+    power = lax.bitcast_convert_type(bits, jnp.float32)
+    return jnp.where((power > 0) & (power < jnp.inf), power, 1)
 
 
 def _cast_in_lanes(
@@ -108,7 +145,7 @@ def _cast_in_lanes(
 ) -> Trace:
     """Cast rays in lanes that take the next ray when they are through."""
     size = len(origins)
-    rays = jnp.concatenate([origins, directions], axis=1).astype(jnp.float32)
+    rays = jnp.concatenate([origins, directions], axis=1)
 
     def refill(state: _Lanes) -> _Lanes:
         idle = state.node == 0
@@ -157,7 +194,7 @@ def _cast_apart(
 ) -> Trace:
     """Cast each ray in a lane of its own, so that rays may be shared out between devices."""
     del lanes
-    rays = jnp.concatenate([origins, directions], axis=1).astype(jnp.float32)
+    rays = jnp.concatenate([origins, directions], axis=1)
     # Made of the rays, so that in `shard_map` each array varies over the devices as they do.
     zero = ((rays[:, 0] > 0) & False).astype(jnp.int32)
     place = jnp.arange(len(rays), dtype=jnp.int32) + zero

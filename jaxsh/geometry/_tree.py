@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from ._mesh import Mesh
+from ._frame import Frame
 
 
 class RayTree(NamedTuple):
@@ -26,18 +26,19 @@ class RayTree(NamedTuple):
     boxes: Float[Array, "s 12"]  # row i: lowest and highest corner of nodes 2i and 2i + 1
     corners: Float[Array, "s 9"]  # the triangle of leaf s + j
     triangle: Int[Array, " s"]  # its number: through the faces of all meshes, in order
+    center: Float[Array, " 3"]  # boxes and corners hold (position - center)·scale
+    scale: Float[Array, ""]
 
 
-def ray_tree(meshes: list[Mesh]) -> RayTree:
+def ray_tree(corners: Float[np.ndarray, "f 3 3"], frame: Frame) -> RayTree:
     """Split the triangles again and again in two halves along the longest extent of their centers.
+
+    `corners` are in the frame.
 
     Triangles with a NaN or infinite corner are left out, as in Embree; raises `ValueError` where
     none is left. Splits by surface area would spare a ray some boxes, but give a tree of uneven
     depth, which needs links and a stack or two; halves need neither.
     """
-    corners = np.concatenate(
-        [np.asarray(mesh.vertices, np.float32)[np.asarray(mesh.faces)] for mesh in meshes]
-    )
     usable = np.flatnonzero(np.isfinite(corners).all(axis=(1, 2)))
     if len(usable) == 0:
         raise ValueError("there is no face with finite corners to cast rays at")
@@ -64,4 +65,6 @@ def ray_tree(meshes: list[Mesh]) -> RayTree:
         jnp.asarray(boxes),
         jnp.asarray(corners[order].reshape(-1, 9)),
         jnp.asarray(order.astype(np.int32)),
+        jnp.asarray(frame.center, jnp.float32),
+        jnp.asarray(frame.scale, jnp.float32),
     )

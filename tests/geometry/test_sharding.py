@@ -21,12 +21,12 @@ def test_trace_keeps_the_sharding_of_rays(scene, rng):
     origins, directions = rng.normal(size=(2, 64, 3)).astype(np.float32)
     limits = rng.uniform(0.5, 2, size=64).astype(np.float32)
 
-    def cast(boxes, corners, triangle, origins, directions, limits):
-        tree = RayTree(boxes, corners, triangle)
+    def cast(*arrays):
+        tree, (origins, directions, limits) = RayTree(*arrays[:-3]), arrays[-3:]
         found = geometry.trace(tree, origins, directions, limits, lanes=16)
         return found.triangle, jnp.minimum(found.distance, 9), found.barycentric
 
-    specs = (WHOLE, WHOLE, WHOLE, ROWS, ROWS, ROWS)
+    specs = (*[WHOLE] * len(scene.tree), ROWS, ROWS, ROWS)
     check_sharded(cast, (*scene.tree, origins, directions, limits), specs, (ROWS, ROWS, ROWS))
 
 
