@@ -1,0 +1,113 @@
+"""Decode the pictures of a glTF file with Pillow."""
+
+import io
+import warnings
+
+import numpy as np
+from jaxtyping import UInt8
+
+from ._gltf_accessors import view_bytes
+from ._gltf_container import Document
+from ._gltf_json import Fields, extension, text, whole
+
+_FORMATS = ("PNG", "JPEG", "WEBP")
+# Other places where a texture may name its picture, and whether that is decoded here.
+_EXTENSIONS = {
+    "EXT_texture_webp": True,
+    "KHR_texture_basisu": False,
+    "EXT_texture_avif": False,
+    "MSFT_texture_dds": False,
+}
+_ROWS = 256
+
+
+class Pictures:
+    """Decodes the pictures that textures name, each once, as 8-bit RGBA.
+
+    A picture that cannot be read is no reason to refuse the shape: `note_unread` says so.
+    """
+
+    def __init__(self, document: Document):
+        self._document = document
+        self._read: dict[int | str, UInt8[np.ndarray, "h w 4"] | None] = {}
+        self._pixels = 0
+        self._unread: list[str] = []
+
+    def note_unread(self) -> None:
+        """Note how many textures could not be read, and why the first one could not."""
+        if self._unread:
+            self._document.note(f"textures not read (first: {self._unread[0]})", len(self._unread))
+
+    def read(self, texture: Fields, owner: str) -> UInt8[np.ndarray, "h w 4"] | None:
+        """Decode the picture of a texture, None where that cannot be."""
+        number, unread = None, "without a picture"
+        if texture.get("source") is not None:
+            number = whole(texture, "source", owner)
+        for name, decoded in _EXTENSIONS.items():
+            fields = extension(texture, name, owner)
+            if fields is None:
+                continue
+            if decoded:
+                number = whole(fields, "source", owner)
+            else:
+                unread = f"with {name} only"
+        if number is None:
+            self._unread.append(f"{owner} is {unread}")
+            return None
+        image = self._document.item("images", number, owner)
+        name = f"image {number}"
+        where = text(image, "uri", name)
+        key = whole(image, "bufferView", name) if where is None else where
+        if key not in self._read:
+            try:
+                data = (
+                    self._document.resource(key, name)
+                    if isinstance(key, str)
+                    else bytes(view_bytes(self._document, key, name)[0])
+                )
+                self._read[key] = self._decode(data, name)
+            except ValueError as error:
+                self._unread.append(str(error))
+                self._read[key] = None
+        return self._read[key]
+
+    def _decode(self, data: bytes, owner: str) -> UInt8[np.ndarray, "h w 4"]:
+        from PIL import Image, UnidentifiedImageError
+
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of large pictures: their size is checked here
+                image = Image.open(io.BytesIO(data), formats=_FORMATS)
+                self._check_size(image.size, len(data))
+                image.load()
+                return _as_rgba(image)
+        except UnidentifiedImageError:
+            kind = "KTX2" if data[1:7] == b"KTX 20" else "neither PNG, JPEG nor WebP"
+            raise ValueError(f"{owner} cannot be decoded: it is {kind}") from None
+        except Exception as error:  # decoders may raise anything where a picture is damaged
+            reason = str(error).strip().split("\n")[0]
+            raise ValueError(f"{owner} cannot be decoded: {reason}") from None
+
+    def _check_size(self, size: tuple[int, int], stored: int) -> None:
+        # A byte seldom gives more than ten pixels; more are for plain pictures of moderate size.
+        self._pixels += size[0] * size[1]
+        if self._pixels > 25_000_000 + 16 * (stored + self._document.size):
+            raise ValueError(
+                f"{size[0]} × {size[1]} pixels are out of proportion to {stored} bytes"
+            )
+
+
+def _as_rgba(image) -> UInt8[np.ndarray, "h w 4"]:
+    """Convert to 8-bit RGBA, some rows at a time to need little memory."""
+    width, height = image.size
+    pixels = np.empty((height, width, 4), np.uint8)
+    for top in range(0, height, _ROWS):
+        rows = image.crop((0, top, width, min(top + _ROWS, height)))
+        if rows.mode.startswith("I"):  # 16-bit gray, which Pillow would clip
+            gray = (np.asarray(rows).astype(np.uint32) + 128) // 257
+            pixels[top : top + _ROWS] = np.stack([gray] * 3 + [np.full_like(gray, 255)], axis=2)
+        else:
+            if rows.mode == "CMYK":
+                rows = rows.convert("RGB")
+            pixels[top : top + _ROWS] = np.asarray(rows.convert("RGBA"))
+    return pixels
