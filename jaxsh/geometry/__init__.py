@@ -10,7 +10,8 @@ from ._cast import JaxRayScene
 from ._embree import EmbreeRayScene, ray_scene
 from ._files._write import write_mesh
 from ._knot import knot
-from ._mesh import Mesh, make_mesh, vertex_normals
+from ._make import make_mesh
+from ._mesh import Mesh, vertex_normals
 from ._rays import Hit, RayScene
 from ._read import read_mesh
 from ._topology import Topology, neighbors, topology

@@ -1,21 +1,34 @@
 """Faults of raw vertices and faces that a mesh may not have."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 
+class Clean(NamedTuple):
+    """Holds what is left of raw vertices and faces, joined where positions are equal."""
+
+    vertices: np.ndarray  # (v, 3) float32
+    faces: np.ndarray  # (f, 3) int32
+    rows: np.ndarray  # (f,) of the raw faces
+    backs: np.ndarray  # (f,) True for a face that is another's back
+    found: list[str]  # a phrase for each fault
+
+
 def clean(
-    vertices: np.ndarray, faces: np.ndarray, *, corners: bool
-) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    vertices: np.ndarray, faces: np.ndarray, *, corners: bool, two_sided: bool = False
+) -> Clean:
     """Give float32 vertices and int32 faces without faults, and a phrase for each fault found.
 
     With `corners`, the source stores vertices once per face corner or seam by nature (STL, glTF),
-    so that merging equal ones is no finding.
+    so that merging equal ones is no finding. With `two_sided`, faces that are each other's back
+    both stay.
     """
-    _check(vertices, faces)
     with np.errstate(over="ignore"):  # what leaves float32's range is infinite, and dropped as such
         # + 0 makes -0 and 0 the same position
         vertices = vertices.astype(np.float32) + np.float32(0)
     faces = faces.astype(np.int32)
+    rows = np.arange(len(faces))
     found = []
 
     def note(count: int, what: str) -> None:
@@ -26,13 +39,13 @@ def clean(
     keep = finite[faces].all(axis=1)
     note(int((~finite).sum()), "NaN or infinite vertices dropped")
     note(int((~keep).sum()), "faces with NaN or infinite vertices dropped")
-    faces = faces[keep]
+    faces, rows = faces[keep], rows[keep]
 
     referenced = np.zeros(len(vertices), bool)
     referenced[faces] = True
     note(int((finite & ~referenced).sum()), "unreferenced vertices dropped")
 
-    first = _first_of_equals(vertices)
+    first = first_of_equals(vertices)
     if not corners:
         note(
             int((referenced & (first != np.arange(len(first)))).sum()), "duplicate vertices merged"
@@ -41,26 +54,28 @@ def clean(
 
     keep = _has_area(vertices, faces)
     note(int((~keep).sum()), "degenerate faces dropped")
-    faces = faces[keep]
+    faces, rows = faces[keep], rows[keep]
 
-    # The same three vertices the same way round: turn each face to start at its smallest index.
-    start = faces.argmin(axis=1)[:, None]
-    turned = np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1)
-    unique = np.sort(np.unique(turned, axis=0, return_index=True)[1])
-    note(len(faces) - len(unique), "duplicate faces dropped")
-    faces = faces[unique]
+    repeated, backs = _repeats(faces)
+    note(int(repeated.sum()), "duplicate faces dropped")
+    if not two_sided:
+        note(int((backs & ~repeated).sum()), "faces that are another's back dropped")
+        repeated, backs = repeated | backs, np.zeros_like(backs)
+    faces, rows, backs = faces[~repeated], rows[~repeated], backs[~repeated]
 
     if len(faces) == 0:
         raise ValueError(f"no face is left ({', '.join(found) or 'there were none'})")
-    used = np.unique(faces)
-    lost = np.setdiff1d(first[referenced], used)
-    note(len(lost), "vertices of dropped faces alone dropped")
-    renumber = np.zeros(len(vertices), np.int32)
-    renumber[used] = np.arange(len(used), dtype=np.int32)
-    return vertices[used], renumber[faces], found
+    used = np.zeros(len(vertices), bool)
+    used[faces] = True
+    lost = np.zeros(len(vertices), bool)
+    lost[first[referenced]] = True
+    note(int((lost & ~used).sum()), "vertices of dropped faces alone dropped")
+    renumber = np.cumsum(used, dtype=np.int32) - np.int32(1)
+    return Clean(vertices[used], renumber[faces], rows, backs, found)
 
 
-def _check(vertices: np.ndarray, faces: np.ndarray) -> None:
+def check_arrays(vertices: np.ndarray, faces: np.ndarray) -> None:
+    """Raise `ValueError` where raw arrays have not the shapes and types of a mesh."""
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise ValueError(f"vertices must have shape (v, 3), got {vertices.shape}")
     if faces.ndim != 2 or faces.shape[1] != 3:
@@ -77,10 +92,49 @@ def _check(vertices: np.ndarray, faces: np.ndarray) -> None:
         )
 
 
-def _first_of_equals(vertices: np.ndarray) -> np.ndarray:
-    """Give for each vertex the index of the first one at the same position."""
-    _, first, group = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    return first[group.reshape(-1)].astype(np.int32)
+def first_of_equals(rows: np.ndarray) -> np.ndarray:
+    """Give for each row of a float32 array the index of the first one with the same bits."""
+    bits = np.ascontiguousarray(rows, np.float32).view(np.uint32)
+    # Rows that are equal have one hash, and are found by sorting that alone.
+    key = np.zeros(len(bits), np.uint64)
+    for column in bits.T:
+        key = (key ^ column) * np.uint64(0x9E3779B97F4A7C15)
+        key ^= key >> np.uint64(29)
+    first = _first(key)
+    if (bits[first] != bits).any():  # two rows with one hash: sort all columns
+        _, at, group = np.unique(bits, axis=0, return_index=True, return_inverse=True)
+        first = at[group.reshape(-1)]
+    return first.astype(np.int32)
+
+
+def _first(keys: np.ndarray) -> np.ndarray:
+    """Give for each key the index of the first equal one."""
+    order = np.argsort(keys, kind="stable")
+    ordered = keys[order]
+    begins = np.flatnonzero(np.diff(ordered, prepend=~ordered[:1]) != 0)
+    first = np.empty(len(keys), np.int64)
+    first[order] = np.repeat(order[begins], np.diff(begins, append=len(keys)))
+    return first
+
+
+def _repeats(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tell which faces repeat an earlier one the same way round, and which run the other way."""
+    ends = np.sort(faces, axis=1).astype(np.uint64)
+    count = np.uint64(int(faces.max(initial=0)) + 1)
+    # Three indices as one number, or two where three do not fit.
+    pair = ends[:, 0] * count + ends[:, 1]
+    if int(count) ** 3 < 2**64:
+        first = _first(pair * count + ends[:, 2])
+    else:
+        first = _first(_first(pair).astype(np.uint64) * count + ends[:, 2])
+    # Even permutations of the sorted corners run one way, odd ones the other.
+    a, b, c = faces.T
+    odd = (a > b) ^ (b > c) ^ (a > c)
+    backs = odd != odd[first]
+    repeated = ~backs & (first != np.arange(len(faces)))
+    later = np.flatnonzero(backs)
+    repeated[later] = _first(first[later].astype(np.uint64)) != np.arange(len(later))
+    return repeated, backs
 
 
 def _has_area(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from ._mesh import Mesh, make_mesh
+from ._make import make_mesh
+from ._mesh import Mesh
 
 # The curve winds _TURNS times around the axis of a torus of radius 1 and _COILS times around its
 # tube of radius _SWING; a pipe of radius _PIPE follows it. Strands keep a gap between them.

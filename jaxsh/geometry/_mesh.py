@@ -1,24 +1,21 @@
-"""The mesh, its normals, and how raw arrays become one."""
-
-import warnings
+"""The mesh and its normals."""
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import lax
 from jaxtyping import Array, Float, Int
 
 from .._core.xla import keep_rows, rows_are_split
 from ._base_color import BaseColor
-from ._clean import clean
 
 
 class Mesh(eqx.Module):
     """Holds a triangle mesh: positions, faces (counter-clockwise seen from outside), unit normals.
 
     `make_mesh` and `read_mesh` give float32 vertices and normals and int32 faces, with no
-    degenerate face and no vertex that is NaN, infinite, duplicate or in no face; a `Mesh` built
+    degenerate face and no vertex that is NaN, infinite or in no face. A position stands there once
+    for each normal, UV or color that it has: `neighbors` and `topology` join them. A `Mesh` built
     by hand is taken as it is. Differentiable in vertices and normals; the faces are constants.
 
     **Example**
@@ -41,47 +38,13 @@ class Mesh(eqx.Module):
     origin: tuple[float, float, float] = eqx.field(static=True, default=(0.0, 0.0, 0.0))
 
 
-def make_mesh(
-    vertices: Float[Array | np.ndarray, "v 3"], faces: Int[Array | np.ndarray, "f 3"]
-) -> Mesh:
-    """Make a `Mesh` from positions (v, 3) and vertex indices (f, 3), cleaned.
-
-    Faces that touch a NaN or infinite vertex, faces without area (to float32's resolution) and
-    repeated faces are dropped, vertices at exactly the same float32 position merged, and vertices
-    in no face dropped; the rest keeps its order. One `UserWarning` counts what was found.
-
-    Raises `ValueError` where shapes are wrong, an index names no vertex, or no face is left.
-    Not differentiable: move the vertices of the result and call `vertex_normals`.
-
-    **Example**
-
-    >>> import numpy as np
-    >>> from jaxsh import geometry
-    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    >>> square = geometry.make_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]))
-    >>> square.normals.tolist()[0]
-    [0.0, 0.0, 1.0]
-    """
-    return build(np.asarray(vertices), np.asarray(faces), source="mesh", corners=False)
-
-
-def build(vertices: np.ndarray, faces: np.ndarray, *, source: str, corners: bool) -> Mesh:
-    """Make a mesh as `make_mesh` does, for a named source; `corners` as in `clean`."""
-    try:
-        vertices, faces, found = clean(vertices, faces, corners=corners)
-    except ValueError as error:
-        raise ValueError(f"{source}: {error}") from None
-    if found:
-        warnings.warn(f"{source}: {', '.join(found)}", UserWarning, stacklevel=3)
-    points, triangles = jnp.asarray(vertices), jnp.asarray(faces)
-    return Mesh(points, triangles, vertex_normals(points, triangles))
-
-
 def vertex_normals(vertices: Float[Array, "v 3"], faces: Int[Array, "f 3"]) -> Float[Array, "v 3"]:
-    """Compute unit vertex normals: the mean of the faces' normals around, weighted by their area.
+    """Compute unit vertex normals: the mean of the faces' normals around, weighted by their angle.
 
-    `vertices` (v, 3) and `faces` (f, 3) give (v, 3) in the dtype of the vertices. Where a vertex's
-    faces cancel, have no area, or there are none, the normal is +z with zero gradient.
+    `vertices` (v, 3) and `faces` (f, 3) give (v, 3) in the dtype of the vertices. The weight of a
+    face is its angle at the vertex (Thürmer & Wüthrich 1998; compared with others by Max 1999): how
+    a flat surface is cut into triangles does not matter. Where a vertex's faces cancel, have no
+    area, or there are none, the normal is +z with zero gradient.
 
     Differentiable in the vertices, forward and reverse. Runs under `jit` and `vmap`. Faces may be
     shared out between devices, and poses along an axis in front by `vmap`; vertices may not, since
@@ -109,10 +72,19 @@ def _vertex_normals(vertices, faces):
     # Neither factor changes a direction: without them large or tiny meshes leave float32's range.
     points = vertices / _largest(vertices)
     corners = points[faces]
-    areas = jnp.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    edges = jnp.roll(corners, -1, axis=1) - corners
+    edges = edges / _largest(edges, axis=(1, 2))
+    across = jnp.cross(edges[:, :1], edges[:, 1:2])
+    squared = jnp.sum(across * across, axis=-1, keepdims=True)
+    has_area = squared > 0
+    twice_area = jnp.sqrt(jnp.where(has_area, squared, 1))
+    cosines = -jnp.sum(edges * jnp.roll(edges, 1, axis=1), axis=-1, keepdims=True)
+    # Sine and cosine, both times the lengths of the two edges.
+    angles = jnp.arctan2(twice_area, jnp.where(has_area, cosines, 1))
+    parts = jnp.where(has_area, angles * (across / twice_area), 0)
     # Zeros that are sharded as the points are: under `vmap` JAX >= 0.12 asks for that.
     zeros = jnp.where(jnp.zeros_like(points, dtype=bool), points, jnp.zeros_like(points))
-    sums = zeros.at[faces].add(areas[:, None])
+    sums = zeros.at[faces].add(parts)
     sums = sums / _largest(sums, axis=-1)
     squared = jnp.sum(sums * sums, axis=-1, keepdims=True)
     has_normal = squared > 0
@@ -120,7 +92,7 @@ def _vertex_normals(vertices, faces):
     return jnp.where(has_normal, unit, jnp.zeros_like(unit).at[:, 2].set(1))
 
 
-def _largest(x: Array, axis: int | None = None) -> Array:
+def _largest(x: Array, axis: int | tuple[int, ...] | None = None) -> Array:
     """Take the largest magnitude, as a constant to divide by; 1 where everything is zero."""
     largest = lax.stop_gradient(jnp.max(jnp.abs(x), axis=axis, keepdims=True, initial=0))
     return jnp.where(largest > 0, largest, 1)

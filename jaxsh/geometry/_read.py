@@ -9,9 +9,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ._mesh import Mesh, build
+from ._assemble import Origin, assemble, check_options
+from ._files._polygons import Polygons
+from ._mesh import Mesh
 
-_FORMATS = (".ply", ".obj", ".off", ".stl", ".glb")
 # What trimesh need not look at. Textures would make it split and reorder vertices.
 _OPTIONS: dict[str, dict[str, Any]] = {
     ".ply": {"fix_texture": False, "skip_materials": True},
@@ -34,19 +35,41 @@ _STL_FACET = re.compile(
 )
 
 
-def read_mesh(path: str | os.PathLike[str], *, up: Literal["z", "y"] = "z") -> Mesh:
-    """Read a PLY, OBJ, OFF, STL or GLB file into one `Mesh`.
+def read_mesh(
+    path: str | os.PathLike[str],
+    *,
+    up: Literal["z", "y"] | None = None,
+    normals: str | float = "file",
+    colors: Literal["srgb", "linear"] | None = None,
+    origin: Origin | None = None,
+    two_sided: bool = False,
+) -> Mesh:
+    """Read a PLY, OBJ, OFF, STL, GLB or glTF file into one `Mesh`.
 
     Several objects become one mesh, each where its scene puts it; polygons become triangles.
-    `up` names the axis that points up in the file: "z" takes positions as they are, "y" turns
-    them by 90° about x, so that y becomes z (glTF is y-up by its specification, and nothing is
-    turned unless asked). Cleaned as in `make_mesh`, with one `UserWarning` that counts what was
-    dropped; merging the corners that STL and GLB store apart is no fault and not counted.
+    Values are as in the file: lengths are not scaled. Cleaned as in `make_mesh`, with one
+    `UserWarning` that counts what was dropped, and says what else of the file is ignored.
+
+    - `up` names the axis that points up in the file: "z" takes positions as they are, "y" turns
+      them, and their normals, by 90° about x, so that y becomes z. None is "y" for GLB and glTF,
+      as their specification says, and "z" for all others.
+    - `normals`: "file" takes the file's where it has any (not STL's, which are those of its
+      facets), so that hard edges stay hard: a position becomes a vertex for each normal. "smooth"
+      computes them as `vertex_normals` does, over all faces at a position. An angle in degrees
+      does so too, but splits vertices where faces meet at more than that: 0 is flat shading.
+      A bad normal (NaN, zero) is replaced by the smooth one.
+    - `colors` says how the file encodes vertex colors: "srgb" or "linear". None is "linear" for GLB
+      and glTF and "srgb" for all others, which do not say. `Mesh.colors` are linear.
+    - `origin`: what to take off the coordinates (after `up`), in float64, before they become
+      float32. None takes nothing off unless float32 would lose their shape: where they are over 8
+      times the size of the mesh, and rounded by more than 1/1000 of the median edge. Then
+      a round point near the middle is taken off, and said. `Mesh.origin` keeps it.
+    - `two_sided`: of two faces that are each other's back the later is dropped, as in `make_mesh`;
+      True keeps both.
 
     Raises `FileNotFoundError` for a missing file, and `ValueError`, naming the file and the
     problem, for an unknown extension, a damaged or truncated file, and one without faces. An OBJ
     file does not say how much it holds: cut off between two lines it cannot be told from a whole.
-    Raises `ImportError` where trimesh, which parses, cannot be imported.
 
     **Example**
 
@@ -60,24 +83,23 @@ def read_mesh(path: str | os.PathLike[str], *, up: Literal["z", "y"] = "z") -> M
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in _FORMATS:
-        raise ValueError(f"{path}: cannot read {suffix or 'no extension'}, only {_FORMATS}")
+    if suffix not in _PARSERS:
+        raise ValueError(f"{path}: cannot read {suffix or 'no extension'}, only {tuple(_PARSERS)}")
+    gltf = suffix in (".glb", ".gltf")
+    up = up or ("y" if gltf else "z")
     if up not in ("z", "y"):
         raise ValueError(f'up must be "z" or "y", got {up!r}')
+    if colors not in (None, "srgb", "linear"):
+        raise ValueError(f'colors must be "srgb" or "linear", got {colors!r}')
+    check_options(normals, origin)
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such mesh file")
     data = path.read_bytes()
     try:
-        if suffix == ".obj":
-            data = _plain_obj(data)
-        announced = _announced(data, suffix)
-        vertices, faces = _parse(data, suffix)
-        # Each polygon gives at least one triangle.
-        if announced and (len(vertices) != announced[0] or len(faces) < announced[1]):
-            raise ValueError(
-                f"it announces {announced[0]} vertices and {announced[1]} faces, "
-                f"but {len(vertices)} vertices and {len(faces)} triangles could be read"
-            )
+        if not data.strip():
+            raise ValueError("it is empty")
+        polygons = _PARSERS[suffix](path, data)
+        _check(polygons)
     except Exception as error:  # a parser may raise anything when a file is damaged
         # trimesh looks for this package, which it does not require, in text that is not UTF-8.
         if isinstance(error, ImportError) and error.name != "charset_normalizer":
@@ -85,8 +107,60 @@ def read_mesh(path: str | os.PathLike[str], *, up: Literal["z", "y"] = "z") -> M
         reason = str(error).strip().split("\n")[0]
         raise ValueError(f"{path}: damaged or not a {suffix} file: {reason}") from error
     if up == "y":
-        vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1)
-    return build(vertices, faces, source=str(path), corners=suffix in (".stl", ".glb"))
+        polygons = _turned(polygons)
+    return assemble(
+        polygons,
+        source=str(path),
+        corners=gltf or suffix == ".stl",
+        normals=normals,
+        encoding=colors or ("linear" if gltf else "srgb"),
+        origin=origin,
+        two_sided=two_sided,
+    )
+
+
+def _check(polygons: Polygons) -> None:
+    """Raise `ValueError` where there are no polygons, or one names a vertex that is none."""
+    if len(polygons.sizes) == 0:
+        raise ValueError("it holds no faces")
+    count = len(polygons.positions)
+    wrong = (polygons.corners < 0) | (polygons.corners >= count)
+    if wrong.any():
+        at = int(wrong.argmax())
+        polygon = int(np.searchsorted(np.cumsum(polygons.sizes), at, side="right"))
+        raise ValueError(
+            f"polygon {polygon} names vertex {polygons.corners[at]}, but vertices are 0 to "
+            f"{count - 1}"
+        )
+
+
+def _turned(polygons: Polygons) -> Polygons:
+    """Turn y-up polygons by 90° about x: y becomes z."""
+
+    def turn(vectors: np.ndarray) -> np.ndarray:
+        return np.stack([vectors[:, 0], -vectors[:, 2], vectors[:, 1]], axis=1)
+
+    normals = None if polygons.normals is None else turn(polygons.normals)
+    return polygons._replace(positions=turn(polygons.positions), normals=normals)
+
+
+def _by_trimesh(path: Path, data: bytes) -> Polygons:
+    suffix = path.suffix.lower()
+    if suffix == ".obj":
+        data = _plain_obj(data)
+    announced = _announced(data, suffix)
+    vertices, faces = _parse(data, suffix)
+    # Each polygon gives at least one triangle.
+    if announced and (len(vertices) != announced[0] or len(faces) < announced[1]):
+        raise ValueError(
+            f"it announces {announced[0]} vertices and {announced[1]} faces, "
+            f"but {len(vertices)} vertices and {len(faces)} triangles could be read"
+        )
+    faces = np.asarray(faces, np.int64)
+    return Polygons(np.asarray(vertices, np.float64), faces.ravel(), np.full(len(faces), 3))
+
+
+_PARSERS = dict.fromkeys((".ply", ".obj", ".off", ".stl", ".glb", ".gltf"), _by_trimesh)
 
 
 def _parse(data: bytes, suffix: str) -> tuple[np.ndarray, np.ndarray]:

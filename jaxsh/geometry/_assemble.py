@@ -1,0 +1,185 @@
+"""A mesh out of polygons: centered, triangulated, cleaned, split where attributes differ."""
+
+import math
+import warnings
+from typing import Literal
+
+import jax.numpy as jnp
+import numpy as np
+
+from ._clean import Clean, clean
+from ._files._polygons import Polygons
+from ._files._triangulate import triangulate
+from ._mesh import Mesh, vertex_normals
+from ._split import smooth_groups, split
+
+Origin = tuple[float, float, float]
+
+# Coordinates are large where float32 rounds them by more than this share of the median edge.
+_LOST = 1e-3
+# Sizes of the mesh that they are large beside: below, a center does not help.
+_FAR = 8
+
+
+def check_options(normals: str | float, origin: object) -> None:
+    """Raise `ValueError` where an option of `read_mesh` or `make_mesh` is none."""
+    number = isinstance(normals, int | float) and not isinstance(normals, bool)
+    if normals not in ("file", "smooth") and not (number and 0 <= normals <= 180):
+        raise ValueError(
+            f'normals must be "file", "smooth" or an angle from 0 to 180 degrees, got {normals!r}'
+        )
+    if origin is not None:
+        try:
+            point = np.asarray(origin, np.float64)
+        except (TypeError, ValueError):
+            point = np.zeros(0)
+        if point.shape != (3,) or not np.isfinite(point).all():
+            raise ValueError(f"origin must be three finite numbers, got {origin!r}")
+
+
+def assemble(
+    polygons: Polygons,
+    *,
+    source: str,
+    corners: bool,
+    normals: str | float = "file",
+    encoding: Literal["srgb", "linear"] = "srgb",
+    origin: Origin | None = None,
+    two_sided: bool = False,
+) -> Mesh:
+    """Make a mesh of what a parser gives, with one `UserWarning` on behalf of `source`.
+
+    `corners` as in `clean`, `encoding` that of the colors; the rest as in `read_mesh`.
+    """
+    found = list(polygons.found)
+    slots, owner, crossed = triangulate(polygons.positions, polygons.corners, polygons.sizes)
+    if crossed:
+        found.append(f"{crossed} polygons that cross over themselves cut as well as can be")
+    raw = polygons.corners[slots]
+    if origin is None:
+        origin, phrase = _origin(polygons.positions, raw)
+        found += phrase
+    positions = polygons.positions - np.asarray(origin, np.float64)
+    split_up = (polygons.normals, polygons.uv, polygons.colors)
+    apart = corners or any(attribute is not None for attribute in split_up)
+    try:
+        whole = clean(positions, raw, corners=apart, two_sided=two_sided)
+    except ValueError as error:
+        raise ValueError(f"{source}: {error}") from None
+    slots, raw = slots[whole.rows], raw[whole.rows]
+
+    attributes = []
+    if normals == "file" and polygons.normals is not None:
+        # Where the file's agree they are one vertex, whatever the faces around.
+        knots = whole.faces
+        vectors, phrase = _from_file(polygons.normals[slots], whole)
+        found += phrase
+        attributes.append(vectors)
+    else:
+        knots, at_knots = _knots(whole, normals)
+        vectors = None
+    uv = None if polygons.uv is None else _uv(polygons.uv[slots])
+    colors = None if polygons.colors is None else _linear(polygons.colors[slots], encoding)
+    attributes += [a for a in (uv, colors) if a is not None]
+    found += whole.found
+    if found:
+        warnings.warn(f"{source}: {', '.join(found)}", UserWarning, stacklevel=3)
+
+    material = None
+    if polygons.polygon_material is not None and polygons.materials:
+        material = jnp.asarray(polygons.polygon_material[owner[whole.rows]], jnp.int32)
+    if attributes or knots is not whole.faces:
+        corner, faces = split(whole.faces, knots, raw, attributes)
+        vertices = whole.vertices[whole.faces.ravel()[corner]]
+        given = np.asarray(at_knots)[knots] if vectors is None else vectors
+        unit = jnp.asarray(given.reshape(-1, 3)[corner])
+    else:
+        corner, faces, vertices, unit = slice(0), whole.faces, whole.vertices, at_knots
+    return Mesh(
+        jnp.asarray(vertices),
+        jnp.asarray(faces),
+        unit,
+        uv=None if uv is None else jnp.asarray(uv.reshape(-1, 2)[corner]),
+        colors=None if colors is None else jnp.asarray(colors.reshape(-1, 4)[corner]),
+        face_material=material,
+        materials=polygons.materials,
+        origin=(float(origin[0]), float(origin[1]), float(origin[2])),
+    )
+
+
+def _knots(whole: Clean, normals: str | float):
+    """Name for each corner the point whose faces share a normal, and give the normals there."""
+    knots, vertices = whole.faces, whole.vertices
+    if not isinstance(normals, str):
+        knots = smooth_groups(vertices, knots, float(normals))
+    if whole.backs.any():  # the two sides of a sheet face away from each other
+        knots = 2 * knots.astype(np.int64) + whole.backs[:, None]
+    if knots is not whole.faces:
+        _, at, knots = np.unique(knots, return_index=True, return_inverse=True)
+        knots = knots.reshape(-1, 3).astype(np.int32)
+        vertices = vertices[whole.faces.ravel()[at]]
+    return knots, vertex_normals(jnp.asarray(vertices), jnp.asarray(knots))
+
+
+def _from_file(given: np.ndarray, whole: Clean) -> tuple[np.ndarray, list[str]]:
+    """Take unit normals (f, 3, 3) from the file, smooth ones where it has none or bad ones."""
+    missing = np.isnan(given).all(axis=2)
+    with np.errstate(invalid="ignore"):
+        largest = np.abs(given).max(axis=2)
+        good = np.isfinite(largest) & (largest > 0)
+        scaled = given / np.where(good, largest, 1)[..., None]
+        unit = scaled / np.where(good, np.linalg.norm(scaled, axis=2), 1)[..., None]
+    if not good.all():
+        knots, smooth = _knots(whole, "smooth")
+        unit = np.where(good[..., None], unit, np.asarray(smooth)[knots])
+    unit = unit.astype(np.float32) + np.float32(0)
+    a, b, c = np.moveaxis(whole.vertices[whole.faces].astype(np.float64), 1, 0)
+    behind = (np.einsum("fki,fi->fk", unit, np.cross(b - a, c - a)) < 0).all(axis=1)
+    said = [
+        (int((~good & ~missing).sum()), "zero or infinite normals replaced by smooth ones"),
+        (int(missing.sum()), "corners without a normal given a smooth one"),
+        (int(behind.sum()), "faces whose normals point against the order of their corners"),
+    ]
+    return unit, [f"{count} {what}" for count, what in said if count]
+
+
+def _uv(uv: np.ndarray) -> np.ndarray:
+    """Fill what the file leaves out with zeros."""
+    with np.errstate(over="ignore"):
+        uv = uv.astype(np.float32)
+    return np.where(np.isfinite(uv).all(axis=2, keepdims=True), uv, np.float32(0)) + np.float32(0)
+
+
+def _linear(colors: np.ndarray, encoding: str) -> np.ndarray:
+    """Decode RGBA (f, 3, 4), white where the file leaves it out."""
+    colors = np.where(np.isfinite(colors), colors, 1.0)
+    rgb = np.maximum(colors[..., :3], 0)
+    if encoding == "srgb":
+        rgb = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return np.concatenate([rgb, colors[..., 3:]], axis=2).astype(np.float32) + np.float32(0)
+
+
+def _origin(positions: np.ndarray, faces: np.ndarray) -> tuple[Origin, list[str]]:
+    """Choose what to take off the coordinates: nothing, unless float32 would lose their shape."""
+    used = np.zeros(len(positions), bool)
+    used[faces] = True
+    used &= (np.abs(positions) < np.finfo(np.float32).max).all(axis=1)
+    points = positions[used]
+    zero = (0.0, 0.0, 0.0)
+    if not len(points):
+        return zero, []
+    low, high = points.min(axis=0), points.max(axis=0)
+    size, largest = float((high - low).max()), float(max(-low.min(), high.max()))
+    if not largest > _FAR * size > 0:
+        return zero, []
+    edges = np.linalg.norm(positions[faces[:, 0]] - positions[faces[:, 1]], axis=1)
+    edges = edges[np.isfinite(edges) & (edges > 0)]
+    if not len(edges) or largest * 2.0**-24 <= _LOST * float(np.median(edges)):
+        return zero, []
+    # A round number, so that files of one scene often share it.
+    step = 10.0 ** math.floor(math.log10(size))
+    x, y, z = (np.round((low + high) / 2 / step) * step + 0.0).tolist()
+    return (x, y, z), [
+        f"coordinates up to {largest:.7g} over a size of {size:.3g} are too large for float32, "
+        f"origin=({x:.17g}, {y:.17g}, {z:.17g}) taken off"
+    ]

@@ -1,0 +1,72 @@
+"""Corners of a mesh as vertices: split where their attributes differ, joined where not."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ._clean import first_of_equals
+
+# Edges with more faces than this are hard: all pairs of faces would be too many.
+_SHARING = 8
+# In degrees: what float32 positions leave open in an angle.
+_SLACK = 1e-3
+
+
+def split(
+    faces: Int[np.ndarray, "f 3"],
+    knots: Int[np.ndarray, "f 3"],
+    source: Int[np.ndarray, "f 3"],
+    attributes: list[Float[np.ndarray, "f 3 _"]],
+) -> tuple[Int[np.ndarray, " v"], Int[np.ndarray, "f 3"]]:
+    """Give one corner of each vertex, as a row of the flat corners, and the faces of vertices.
+
+    Corners become one vertex where they agree in `faces` (the position), `knots` (the normal) and
+    in all `attributes`. Vertices stand in the order of their `source` row, as in the file.
+    """
+    names = np.stack([faces.ravel(), knots.ravel()], axis=1).astype(np.int32).view(np.float32)
+    columns = [a.reshape(faces.size, -1).astype(np.float32) for a in attributes]
+    first = first_of_equals(np.concatenate([names, *columns], axis=1))
+    corner = np.flatnonzero(first == np.arange(len(first)))
+    earliest = np.full(faces.size, np.iinfo(np.int64).max)
+    np.minimum.at(earliest, first, source.ravel())
+    order = np.lexsort((corner, earliest[corner]))
+    vertex = np.empty(faces.size, np.int32)
+    vertex[corner[order]] = np.arange(len(corner), dtype=np.int32)
+    return corner[order], vertex[first].reshape(-1, 3)
+
+
+def smooth_groups(
+    vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"], angle: float
+) -> Int[np.ndarray, "f 3"]:
+    """Name for each corner the corners around its vertex that it shares a normal with.
+
+    Those are reached from face to face over edges where the normals of the faces that meet differ
+    by at most `angle` degrees; over an edge of more than eight faces nothing is reached.
+    """
+    from scipy.sparse import coo_array, csgraph  # JAX itself needs SciPy
+
+    corners = vertices[faces].astype(np.float64)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    start, end = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel()
+    corner = np.arange(faces.size)  # which also names the edge that leaves it
+    ahead = np.roll(corner.reshape(-1, 3), -1, axis=1).ravel()
+    key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
+    order = np.argsort(key, kind="stable")
+    ordered = key[order]
+    begins = np.flatnonzero(np.diff(ordered, prepend=-1) != 0)
+    sharing = np.diff(begins, append=len(ordered))
+    edge = np.repeat(np.arange(len(begins)), sharing)
+    order, edge = order[sharing[edge] <= _SHARING], edge[sharing[edge] <= _SHARING]
+    links = []
+    for apart in range(1, int(min(sharing.max(), _SHARING))):
+        same = edge[apart:] == edge[:-apart]
+        one, two = order[:-apart][same], order[apart:][same]
+        n, m = normal[one // 3], normal[two // 3]
+        between = np.arctan2(np.linalg.norm(np.cross(n, m), axis=1), (n * m).sum(axis=1))
+        one, two = (x[np.rad2deg(between) <= angle + _SLACK] for x in (one, two))
+        same_way = start[one] == start[two]
+        links.append((one, np.where(same_way, two, ahead[two])))
+        links.append((ahead[one], np.where(same_way, ahead[two], two)))
+    one, two = (np.concatenate(ends) for ends in zip(*links, strict=True)) if links else ([], [])
+    graph = coo_array((np.ones(len(one), np.int8), (one, two)), shape=(faces.size, faces.size))
+    return csgraph.connected_components(graph, directed=False)[1].reshape(-1, 3)
