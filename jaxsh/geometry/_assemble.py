@@ -23,8 +23,11 @@ _FAR = 8
 
 def check_options(normals: str | float, origin: object) -> None:
     """Raise `ValueError` where an option of `read_mesh` or `make_mesh` is none."""
-    number = isinstance(normals, int | float) and not isinstance(normals, bool)
-    if normals not in ("file", "smooth") and not (number and 0 <= normals <= 180):
+    if isinstance(normals, str):
+        known = normals in ("file", "smooth")
+    else:
+        known = not isinstance(normals, bool) and 0 <= normals <= 180
+    if not known:
         raise ValueError(
             f'normals must be "file", "smooth" or an angle from 0 to 180 degrees, got {normals!r}'
         )
@@ -68,7 +71,7 @@ def assemble(
         raise ValueError(f"{source}: {error}") from None
     slots, raw = slots[whole.rows], raw[whole.rows]
 
-    attributes = []
+    attributes, vectors, at_knots = [], None, None
     if normals == "file" and polygons.normals is not None:
         # Where the file's agree they are one vertex, whatever the faces around.
         knots = whole.faces
@@ -77,7 +80,6 @@ def assemble(
         attributes.append(vectors)
     else:
         knots, at_knots = _knots(whole, normals)
-        vectors = None
     uv = None if polygons.uv is None else _uv(polygons.uv[slots])
     colors = None if polygons.colors is None else _linear(polygons.colors[slots], encoding)
     attributes += [a for a in (uv, colors) if a is not None]
@@ -88,7 +90,7 @@ def assemble(
     material = None
     if polygons.polygon_material is not None and polygons.materials:
         material = jnp.asarray(polygons.polygon_material[owner[whole.rows]], jnp.int32)
-    if attributes or knots is not whole.faces:
+    if at_knots is None or attributes or knots is not whole.faces:
         corner, faces = split(whole.faces, knots, raw, attributes)
         vertices = whole.vertices[whole.faces.ravel()[corner]]
         given = np.asarray(at_knots)[knots] if vectors is None else vectors
