@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ._assemble import Origin, assemble, check_options
+from ._files._gltf import read_gltf
 from ._files._polygons import Polygons
 from ._mesh import Mesh
 
@@ -17,7 +18,6 @@ from ._mesh import Mesh
 _OPTIONS: dict[str, dict[str, Any]] = {
     ".ply": {"fix_texture": False, "skip_materials": True},
     ".obj": {"maintain_order": True, "skip_materials": True},
-    ".glb": {"skip_materials": True},
 }
 
 
@@ -160,7 +160,11 @@ def _by_trimesh(path: Path, data: bytes) -> Polygons:
     return Polygons(np.asarray(vertices, np.float64), faces.ravel(), np.full(len(faces), 3))
 
 
-_PARSERS = dict.fromkeys((".ply", ".obj", ".off", ".stl", ".glb", ".gltf"), _by_trimesh)
+_PARSERS = {
+    **dict.fromkeys((".ply", ".obj", ".off", ".stl"), _by_trimesh),
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+}
 
 
 def _parse(data: bytes, suffix: str) -> tuple[np.ndarray, np.ndarray]:
