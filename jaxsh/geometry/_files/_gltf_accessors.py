@@ -7,6 +7,7 @@ from jaxtyping import Float, Integer, Shaped
 
 from ._gltf_container import Document
 from ._gltf_json import Fields, extension, flag, inner, shown, text, whole
+from ._gltf_meshopt import unpack
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _UNSIGNED = {5121, 5123, 5125}
@@ -74,10 +75,16 @@ def read_indices(document: Document, index: int, owner: str) -> Integer[np.ndarr
 def view_bytes(document: Document, index: int, owner: str) -> tuple[memoryview, int]:
     """Give the bytes of a bufferView, decompressed where they are, and its stride (0: none)."""
     fields, name = document.item("bufferViews", index, owner), f"bufferView {index}"
-    packed = extension(fields, "EXT_meshopt_compression", name)
-    if packed is None:
-        return _slice(document, fields, name), whole(fields, "byteStride", name, 0)
-    raise ValueError(f"{name} is compressed by EXT_meshopt_compression, which cannot be read here")
+    stride = whole(fields, "byteStride", name, 0)
+    for compression in ("KHR_meshopt_compression", "EXT_meshopt_compression"):
+        packed = extension(fields, compression, name)
+        if packed is not None:
+            if index not in document.views:
+                title = f"{compression} of {name}"
+                source = _slice(document, packed, title)
+                document.views[index] = unpack(document, source, packed, title)
+            return document.views[index], stride
+    return _slice(document, fields, name), stride
 
 
 def _slice(document: Document, fields: Fields, name: str) -> memoryview:

@@ -20,6 +20,7 @@ _KNOWN = {
     "KHR_texture_transform",
     "KHR_draco_mesh_compression",
     "EXT_meshopt_compression",
+    "KHR_meshopt_compression",
     "EXT_mesh_gpu_instancing",
     "KHR_node_visibility",
     "EXT_texture_webp",
