@@ -75,13 +75,19 @@ def used_pixels(layout: str, height: int, width: int) -> np.ndarray:
     return used
 
 
-def tiles(layout: str, image: Float[np.ndarray, "h w 3"]) -> Tiles:
-    """Cut the picture of a layout into tiles; pixels that are not used are not looked at."""
+def tiles(layout: str, image: Float[np.ndarray, "h w 3"], at_edges: bool = False) -> Tiles:
+    """Cut the picture of a layout into tiles; pixels that are not used are not looked at.
+
+    With `at_edges`, for "lat-long" and "cube", the outermost pixels are centered on the edges,
+    and the cube's last two faces are -z and +z of the table.
+    """
     if layout == "lat-long":
-        return _lat_long(image)
+        return _lat_long_to_the_edge(image) if at_edges else _lat_long(image)
     if layout == "angular-map":
         return _angular_map(image)
     faces = np.stack([image[cell] for cell in _cells(layout, len(image))])
+    if at_edges:
+        return _cube_to_the_edge(faces[[0, 1, 2, 3, 5, 4]])
     if layout == "vertical-cross":
         faces[5] = faces[5, ::-1, ::-1]  # it goes on downwards, over the bottom to the back
     return _cube(faces)
@@ -112,6 +118,19 @@ def _lat_long(image: np.ndarray) -> Tiles:
         row = np.arctan2(np.hypot(x, z), y) / np.pi * height - 0.5
         return np.zeros(len(x), np.int32), row, column
 
+    return Tiles(pixels[None], width, locate)
+
+
+def _lat_long_to_the_edge(image: np.ndarray) -> Tiles:
+    """The first and last row are the poles, the first and last column one meridian."""
+    height, width, _ = image.shape
+
+    def locate(x, y, z):
+        column = (np.arctan2(x, z) / (2 * np.pi) + 0.5) * (width - 1)
+        row = np.arctan2(np.hypot(x, z), y) / np.pi * (height - 1)
+        return np.zeros(len(x), np.int32), row, column
+
+    pixels = np.pad(image, ((1, 1), (1, 1), (0, 0)), "edge")
     return Tiles(pixels[None], width, locate)
 
 
@@ -150,13 +169,8 @@ def _cube(faces: Float[np.ndarray, "6 n n 3"]) -> Tiles:
     n = faces.shape[1]
 
     def locate(x, y, z):
-        side = np.argmax(np.abs([x, y, z]), axis=0)
-        along = np.choose(side, (x, y, z))
-        size, behind = np.abs(along), along < 0
-        sign = np.where(behind, np.float32(-1), np.float32(1))
-        u = np.choose(side, (-z * sign, x, x * sign)) / size
-        v = np.choose(side, (-y, z * sign, -y)) / size
-        return 2 * side + behind, (v + 1) / 2 * n - 0.5, (u + 1) / 2 * n - 0.5
+        tile, v, u = _on_cube(x, y, z)
+        return tile, (v + 1) / 2 * n - 0.5, (u + 1) / 2 * n - 0.5
 
     # The border of a face is what its neighbors show there.
     center = ((2 * np.arange(-1, n + 1) + 1) / n - 1).astype(np.float32)
@@ -169,3 +183,25 @@ def _cube(faces: Float[np.ndarray, "6 n n 3"]) -> Tiles:
         row, column = (np.clip(np.rint(p), 0, n - 1).astype(int) for p in (row, column))
         pixels[face].reshape(-1, 3)[border] = faces[tile, row, column]
     return Tiles(pixels, 4 * n, locate)
+
+
+def _cube_to_the_edge(faces: Float[np.ndarray, "6 n n 3"]) -> Tiles:
+    n = faces.shape[1]
+
+    def locate(x, y, z):
+        tile, v, u = _on_cube(x, y, z)
+        return tile, (v + 1) / 2 * (n - 1), (u + 1) / 2 * (n - 1)
+
+    pixels = np.pad(faces, ((0, 0), (1, 1), (1, 1), (0, 0)), "edge")
+    return Tiles(pixels, 4 * n, locate)
+
+
+def _on_cube(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> Places:
+    """The face that a direction meets, and where on it, v down and u to the right in [-1, 1]."""
+    side = np.argmax(np.abs([x, y, z]), axis=0)
+    along = np.choose(side, (x, y, z))
+    size, behind = np.abs(along), along < 0
+    sign = np.where(behind, np.float32(-1), np.float32(1))
+    u = np.choose(side, (-z * sign, x, x * sign)) / size
+    v = np.choose(side, (-y, z * sign, -y)) / size
+    return 2 * side + behind, v, u

@@ -12,6 +12,8 @@ from jaxtyping import Float
 # - nvdiffrec: `latlong_to_cubemap` in render/util.py: y up, center -z, right +x; also the lat-long
 #   files of the USC high-resolution light probe page
 # - blender: `direction_to_equirectangular` in Cycles' kernel: z up as here, center +x, right -y
+# - openexr: OpenEXR's ImfEnvmap: lat-long as mitsuba; its cube is the face table in axes with z
+#   turned round, so that the fifth and sixth face change places (`_layouts`)
 # - -z, +z: the text and the formula of Debevec's light probe gallery, which do not agree
 # - opengl, direct3d: the same face table in right-handed and in left-handed y-up axes
 _DEBEVEC = {"jaxsh": "+y +z -x", "-z": "+x +z +y", "+z": "+x +z -y"}
@@ -22,18 +24,25 @@ _LANDS = {
         "mitsuba": "-x +z -y",
         "blender": "-y +z +x",
         "nvdiffrec": "+x +z +y",
+        "openexr": "-x +z -y",
     },
     "angular-map": _DEBEVEC,
     "horizontal-cross": _DEBEVEC,
     "vertical-cross": _DEBEVEC,
-    "cube": {"jaxsh": "+x +y +z", "direct3d": "+y +z -x", "opengl": "+x +z -y"},
+    "cube": {
+        "jaxsh": "+x +y +z",
+        "direct3d": "+y +z -x",
+        "opengl": "+x +z -y",
+        "openexr": "+x +z +y",
+    },
 }
 
 LAYOUTS = tuple(_LANDS)
 
 
-def axes_of(layout: str, orientation: str) -> Float[np.ndarray, "3 3"]:
+def axes_of(layout: str, orientation: str | None) -> Float[np.ndarray, "3 3"]:
     """Look up, row by row, where the picture's first, second and third axis land in ours."""
+    orientation = "jaxsh" if orientation is None else orientation
     if layout not in _LANDS:
         raise ValueError(f"layout must be one of {LAYOUTS}, got {layout!r}")
     if orientation not in _LANDS[layout]:
@@ -45,6 +54,12 @@ def axes_of(layout: str, orientation: str) -> Float[np.ndarray, "3 3"]:
     for row, (sign, name) in enumerate(_LANDS[layout][orientation].split()):
         axes[row, "xyz".index(name)] = int(sign + "1")
     return axes
+
+
+def check_options(layout: str | None, orientation: str | None) -> None:
+    """Refuse what is not known, as far as can be said before the file names its own layout."""
+    if layout is not None or orientation not in {o for known in _LANDS.values() for o in known}:
+        axes_of(layout or "lat-long", orientation)
 
 
 def turn_columns(
@@ -62,7 +77,7 @@ def turn_columns(
         image = image[:, ::-1]
     columns = width * (forward - np.pi) / (2 * np.pi)
     whole = int(np.floor(columns + 1e-6))
-    rolled = np.roll(image, whole, axis=1)
+    rolled = np.roll(image, whole, axis=1) if whole % width else image
     if columns - whole < 0.25:
         return rolled
     return rolled / 2 + np.roll(rolled, 1, axis=1) / 2

@@ -19,17 +19,20 @@ def resample(
     picture: Float[np.ndarray, "h w 3"],
     axes: Float[np.ndarray, "3 3"],
     height: int | None,
+    *,
+    at_edges: bool = False,
 ) -> Float[np.ndarray, "height width 3"]:
     """Resample to a lat-long picture in our orientation, `height` rows of twice as many columns.
 
     By default as many columns as the source has pixels on a great circle, up to 2048 rows; float32.
     Each pixel is the mean of n × n samples of equal solid angle, bilinear in the source, with n
-    such that there are two or more to a source pixel along each side (4 ≤ n ≤ 64).
+    such that there are two or more to a source pixel along each side (4 ≤ n ≤ 64). With `at_edges`
+    the outermost pixels are centered on the picture's, or the faces', edges, as OpenEXR's are.
     """
     # A power of two changes no digit, and keeps sums in float32's range.
     largest = picture.max()
     scale = np.float32(2.0 ** (math.frexp(largest)[1] - 1))
-    source = tiles(layout, picture / scale)
+    source = tiles(layout, picture / scale, at_edges)
     height = height or min(max(1, source.around // 2), _DEFAULT_MAX_HEIGHT)
     width = 2 * height
     n = min(max(_LEAST, math.ceil(2 * source.around / width)), _MOST)

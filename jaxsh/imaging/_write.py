@@ -4,15 +4,21 @@ import os
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Real
+
+from ._files import decoded
 
 _DISPLAY, _LINEAR = (".png", ".jpg", ".jpeg"), (".exr", ".hdr")
-_KINDS = {"uint8": "uint8", "float16": "half", "float32": "float"}  # NumPy's names, OpenImageIO's
+# NumPy's names, OpenImageIO's.
+_KINDS = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}
+_MOST_HDR = float(np.ldexp(255 / 256, 127))
 
 
 def write_image(
     path: str | os.PathLike[str],
-    image: Float[Array | np.ndarray, "h w"] | Float[Array | np.ndarray, "h w c"],
+    image: Real[Array | np.ndarray, "h w"] | Real[Array | np.ndarray, "h w c"],
+    *,
+    encoding: str | None = None,
 ) -> Path:
     """Write a picture, gray (h, w), color (h, w, 3) or with alpha (h, w, 4), as its name says.
 
@@ -21,7 +27,11 @@ def write_image(
     keeps 8 bits of the largest channel and no negative values. .jpg and .hdr have no alpha, and
     alpha is not multiplied into colors. Makes missing folders and returns the path.
 
-    Raises `ValueError` for NaN or infinite values, shapes and extensions it does not know,
+    Integers, uint8 or uint16, are no radiance and want `encoding="srgb"`: .png keeps them as they
+    are, .jpg in 8 bits, and .exr and .hdr get the linear light that they stand for.
+
+    Raises `ValueError` for NaN or infinite values, and those that the format cannot hold, for
+    integers without an encoding and floats with one, for shapes and extensions it does not know,
     `OSError` where the file cannot be written, and `ImportError` where OpenImageIO cannot be
     imported. Runs on the host.
 
@@ -42,23 +52,75 @@ def write_image(
         pixels = pixels[..., None]
     channels = (1, 3, 4) if suffix in (".png", ".exr") else (1, 3)
     if pixels.ndim != 3 or pixels.shape[2] not in channels or pixels.size == 0:
+        first = pixels.ndim == 3 and pixels.shape[0] in channels
+        hint = ": channels come last, see jax.numpy.moveaxis" if first else ""
         raise ValueError(
             f"{path}: a {suffix} picture is (height, width) or (height, width, channels) with "
-            f"channels one of {channels}, got shape {np.shape(image)}"
+            f"channels one of {channels}, got shape {np.shape(image)}{hint}"
         )
-    if bad := int((~np.isfinite(pixels)).sum()):
-        raise ValueError(f"{path}: {bad} of {pixels.size} values are NaN or infinite")
-    if suffix == ".hdr":
-        if (pixels < 0).any():
-            raise ValueError(f"{path}: an .hdr picture cannot hold negative values")
-        pixels = np.broadcast_to(pixels, (*pixels.shape[:2], 3))  # it knows no gray
-    if suffix in _DISPLAY:
-        pixels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
-    elif pixels.dtype != np.float16:
-        pixels = pixels.astype(np.float32)
+    try:
+        pixels = _signal(pixels, encoding) if suffix in _DISPLAY else _light(pixels, encoding)
+        if suffix == ".hdr":
+            pixels = _for_hdr(pixels)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    if suffix in (".jpg", ".jpeg") and pixels.dtype == np.uint16:
+        pixels = np.rint(pixels / 257).astype(np.uint8)
     path.parent.mkdir(parents=True, exist_ok=True)
     _write(path, np.ascontiguousarray(pixels))
     return path
+
+
+def _signal(pixels: np.ndarray, encoding: str | None) -> np.ndarray:
+    """Round what a screen shows to 8 bits; what came in 8 or 16 stays."""
+    if _is_coded(pixels, encoding):
+        return pixels
+    return np.rint(np.clip(_finite(pixels), 0, 1) * 255).astype(np.uint8)
+
+
+def _light(pixels: np.ndarray, encoding: str | None) -> np.ndarray:
+    """Linear light in float16 or float32."""
+    if _is_coded(pixels, encoding):
+        return decoded(pixels, encoding)
+    if pixels.dtype == np.float16:
+        return _finite(pixels)
+    with np.errstate(over="ignore"):
+        single = _finite(pixels).astype(np.float32)
+    if bad := int(np.isinf(single).sum()):
+        raise ValueError(f"{bad} of {single.size} values are beyond float32's range")
+    return single
+
+
+def _for_hdr(pixels: np.ndarray) -> np.ndarray:
+    if (pixels < 0).any():
+        raise ValueError("an .hdr picture cannot hold negative values")
+    if (pixels > _MOST_HDR).any():
+        raise ValueError(
+            f"an .hdr picture holds values up to {_MOST_HDR:.3g}, got {pixels.max():.3g}"
+        )
+    return np.broadcast_to(pixels, (*pixels.shape[:2], 3))  # it knows no gray
+
+
+def _is_coded(pixels: np.ndarray, encoding: str | None) -> bool:
+    """True for integers with their encoding; raises `ValueError` for any other combination."""
+    floats = pixels.dtype.kind == "f" or pixels.dtype.name == "bfloat16"
+    if floats and encoding is not None:
+        raise ValueError(f'encoding="srgb" is for uint8 and uint16, got {pixels.dtype}')
+    if not floats and pixels.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"a picture is of floats, uint8 or uint16, got {pixels.dtype}")
+    if not floats and encoding != "srgb":
+        raise ValueError(
+            f'integers ({pixels.dtype}) are no radiance: say encoding="srgb", or decode them by '
+            f"imaging.srgb_decode(image / {np.iinfo(pixels.dtype).max}), got encoding={encoding!r}"
+        )
+    return not floats
+
+
+def _finite(pixels: np.ndarray) -> np.ndarray:
+    pixels = pixels if pixels.dtype.kind == "f" else pixels.astype(np.float32)
+    if bad := int((~np.isfinite(pixels)).sum()):
+        raise ValueError(f"{bad} of {pixels.size} values are NaN or infinite")
+    return pixels
 
 
 def _write(path: Path, pixels: np.ndarray) -> None:

@@ -139,6 +139,33 @@ def direct3d_cube(n):
     return -z[..., None] * [1, 0, 0] + x[..., None] * RIGHT + y[..., None] * UP
 
 
+def openexr_lat_long(n):
+    # ImfEnvmap, LatLongMap::direction: the outermost pixels are on the poles and on the seam
+    latitude = -np.pi * (np.arange(n)[:, None] / (n - 1) - 0.5)
+    longitude = -2 * np.pi * (np.arange(2 * n) / (2 * n - 1) - 0.5)
+    return from_y_up(
+        np.sin(longitude) * np.cos(latitude),
+        np.sin(latitude),
+        np.cos(longitude) * np.cos(latitude),
+    )
+
+
+def openexr_cube(n):
+    # CubeMap::direction of a position in a face, and CubeMap::pixelPosition of that position
+    picture = np.empty((6, n, n, 3))
+    at = np.arange(n)
+    x, y = np.meshgrid(at, at, indexing="ij")  # positions in the face
+    a, b = 2 * x / (n - 1) - 1, 2 * y / (n - 1) - 1
+    one, last = np.ones((n, n)), n - 1
+    picture[0, last - x, y] = from_y_up(one, a, b)
+    picture[1, last - x, last - y] = from_y_up(-one, a, b)
+    picture[2, last - y, x] = from_y_up(a, one, b)
+    picture[3, y, x] = from_y_up(a, -one, b)
+    picture[4, last - y, last - x] = from_y_up(a, b, one)
+    picture[5, last - y, x] = from_y_up(a, b, -one)
+    return picture.reshape(6 * n, n, 3)
+
+
 PAINTERS = {
     ("lat-long", "jaxsh"): jaxsh_lat_long,
     ("lat-long", "debevec"): debevec_lat_long,
@@ -155,6 +182,8 @@ PAINTERS = {
     ("cube", "jaxsh"): jaxsh_cube,
     ("cube", "opengl"): opengl_cube,
     ("cube", "direct3d"): direct3d_cube,
+    ("lat-long", "openexr"): openexr_lat_long,
+    ("cube", "openexr"): openexr_cube,
 }
 
 AXES = {

@@ -69,8 +69,8 @@ def test_gray_gives_three_equal_channels(tmp_path, rng, names):
 
 
 def test_unknown_channels_are_named(tmp_path, picture):
-    path = save(tmp_path / "a.exr", picture, names=("Y", "RY", "BY"))
-    with pytest.raises(ValueError, match=r"a\.exr: needs channels R, G, B .* 'RY'"):
+    path = save(tmp_path / "a.exr", picture, names=("U", "V", "W"))
+    with pytest.raises(ValueError, match=r"a\.exr: needs channels R, G, B .* 'V'"):
         read_environment(path)
 
 
@@ -118,24 +118,6 @@ def test_other_shapes_are_refused(tmp_path, shape):
         read_environment(path)
 
 
-def test_a_crop_is_refused(tmp_path):
-    spec = oiio.ImageSpec(8, 4, 3, "float")
-    spec.full_width, spec.full_height = 16, 8
-    out = oiio.ImageOutput.create("a.exr")
-    assert out.open(str(tmp_path / "a.exr"), spec)
-    assert out.write_image(np.ones((4, 8, 3), np.float32))
-    out.close()
-    with pytest.raises(ValueError, match="only a part of the picture is stored"):
-        read_environment(tmp_path / "a.exr")
-
-
-def test_an_hdr_from_the_bottom_up_is_refused(tmp_path, picture):
-    path = write_image(tmp_path / "a.hdr", picture)
-    path.write_bytes(path.read_bytes().replace(b"-Y 8 +X 16", b"+Y 8 +X 16"))
-    with pytest.raises(ValueError, match="rows must run downwards"):
-        read_environment(path)
-
-
 def test_bad_options_and_names(tmp_path):
     with pytest.raises(ValueError, match=r"layout must be one of \('lat-long', .*, got 'cross'"):
         read_environment("a.exr", layout="cross")
@@ -152,8 +134,10 @@ def test_bad_options_and_names(tmp_path):
         read_environment(["a.exr"] * 6)
     with pytest.raises(ValueError, match="layout 'cube' does not come in 5 files"):
         read_environment(["a.exr"] * 5, layout="cube")
-    with pytest.raises(ValueError, match=r"a\.png: cannot read \.png, only"):
-        read_environment(tmp_path / "a.png")
+    with pytest.raises(ValueError, match=r"encoding must be one of \('srgb', 'linear'\) .*'sRGB'"):
+        read_environment("a.png", encoding="sRGB")
+    with pytest.raises(ValueError, match=r"a\.gif: cannot read \.gif, only"):
+        read_environment(tmp_path / "a.gif")
     with pytest.raises(FileNotFoundError, match=r"a\.exr: there is no such picture"):
         read_environment(tmp_path / "a.exr")
 
@@ -197,11 +181,13 @@ def test_a_number_beyond_float32_is_infinite(tmp_path, picture):
 @pytest.mark.parametrize(
     ("array", "message"),
     [
-        (np.ones((4, 8, 3), int), "needs float16, float32 or float64, got int64"),
+        (np.ones((4, 8, 3), int), "needs float16, .* or uint16, got int64"),
         (np.ones((4, 8, 4)), r"needs shape \(h, w, 3\) or \(h, w\), got \(4, 8, 4\)"),
+        (np.ones((3, 4, 8)), r"needs shape .* got \(3, 4, 8\): channels come last"),
+        (np.ones((4, 8), bool), "needs float16, .* or uint16, got bool"),
         (np.ones(8), "needs shape .* got \\(8,\\)"),
         (np.ones((0, 0, 3)), "a picture needs pixels"),
-        (np.array([[None]]), "needs float16, float32 or float64, got object"),
+        (np.array([[None]]), "needs float16, .* or uint16, got object"),
     ],
 )
 def test_other_arrays_are_refused(tmp_path, array, message):
@@ -230,22 +216,24 @@ def test_a_wrong_pfm_header_is_refused(tmp_path, picture, header, message):
         read_environment(path)
 
 
-def test_an_hdr_with_fewer_rows_than_pixels_is_refused(tmp_path, picture):
-    """Decoders are content with what the header announces."""
-    path = write_image(tmp_path / "a.hdr", np.concatenate([picture, picture]))
-    assert read_environment(path, layout="angular-map").shape == (8, 16, 3)
-    path.write_bytes(path.read_bytes().replace(b"-Y 16 +X 16", b"-Y 8 +X 16"))
-    with pytest.raises(ValueError, match=r"a\.hdr: damaged: 16 × 8 pixels end at byte \d+ of"):
+@pytest.mark.parametrize("suffix", [".pfm", ".npy"])
+def test_padding_is_no_harm(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(encoded(tmp_path, suffix))
+    image = read_environment(path)
+    path.write_bytes(path.read_bytes() + b"\n" + bytes(9))
+    np.testing.assert_array_equal(read_environment(path), image)
+    path.write_bytes(path.read_bytes() + b"more")
+    with pytest.raises(ValueError, match="takes 1536 bytes, but 1550 are there"):
         read_environment(path)
 
 
-def test_a_narrow_hdr_is_not_run_length_coded(tmp_path, rng):
-    pixels = rng.uniform(0.5, 1, size=(2, 4, 3)).astype(np.float32)
-    path = write_image(tmp_path / "a.hdr", pixels)
-    np.testing.assert_allclose(read_environment(path), pixels, atol=1 / 128)
-    path.write_bytes(path.read_bytes() + b"\0")
-    with pytest.raises(ValueError, match="pixels end at byte"):
-        read_environment(path)
+def test_pfm_with_comments_and_alpha(tmp_path, picture):
+    path = tmp_path / "a.pfm"
+    path.write_bytes(pfm(picture).replace(b"PF\n", b"PF\n# made by hand\n", 1))
+    np.testing.assert_array_equal(read_environment(path), picture)
+    path.write_bytes(pfm(np.concatenate([picture, picture[..., :1]], axis=-1), b"PF4"))
+    np.testing.assert_array_equal(read_environment(path), picture)
 
 
 @pytest.mark.parametrize("shape", [(24, 32), (32, 24), (16, 16), (24, 4), (8, 16)])

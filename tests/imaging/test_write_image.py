@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from jaxsh.imaging import write_image
+from jaxsh.imaging import read_environment, srgb_decode, studio, tone_map, write_image
 
 
 def load(path, kind="uint8"):
@@ -91,12 +91,59 @@ def test_gray_hdr_has_three_channels(tmp_path):
         ("a.png", np.array([[0, np.nan, np.inf]]), r"a\.png: 2 of 3 values are NaN or infinite"),
         ("a.exr", np.array([[0, np.nan]]), "1 of 2 values are NaN or infinite"),
         ("a.hdr", np.array([[0, -1.0]]), "cannot hold negative values"),
+        ("a.hdr", np.array([[0, 3e38]], np.float32), r"up to 1\.69e\+38, got 3e\+38"),
+        ("a.exr", np.array([[0, 1e39]]), r"1 of 2 values are beyond float32's range"),
+        ("a.png", np.ones((3, 6, 12)), r"got shape \(3, 6, 12\): channels come last"),
+        ("a.png", np.full((2, 2), 200, np.uint8), r'a\.png: integers \(uint8\).* encoding="srgb"'),
+        ("a.exr", np.full((2, 2), 200, np.uint16), r"a\.exr: integers \(uint16\).*image / 65535\)"),
+        ("a.exr", np.ones((2, 2), int), "of floats, uint8 or uint16, got int64"),
+        ("a.png", np.ones((2, 2), bool), "of floats, uint8 or uint16, got bool"),
+        ("a.png", np.ones((2, 2), complex), "of floats, uint8 or uint16, got complex128"),
     ],
 )
 def test_bad_pictures_are_refused(unchecked, tmp_path, name, image, message):
     with pytest.raises(ValueError, match=message):
         write_image(tmp_path / "new" / name, image)
     assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_integers_are_what_their_encoding_says(tmp_path, rng, dtype):
+    most = np.iinfo(dtype).max
+    image = rng.integers(0, most + 1, size=(8, 16, 3)).astype(dtype)
+    path = write_image(tmp_path / "a.png", image, encoding="srgb")
+    np.testing.assert_array_equal(load(path, dtype.__name__), image)
+    signal = image / most
+    light = np.where(signal <= 0.04045, signal / 12.92, ((signal + 0.055) / 1.055) ** 2.4)
+    path = write_image(tmp_path / "a.exr", image, encoding="srgb")
+    np.testing.assert_allclose(load(path, "float"), light, atol=4e-8)
+    smooth = np.broadcast_to((np.arange(16) * (most // 16)).astype(dtype), (8, 16))
+    pixels = load(write_image(tmp_path / "a.jpg", smooth, encoding="srgb"))[..., 0]
+    np.testing.assert_allclose(pixels, smooth / (most / 255), atol=2)
+    # An encoding on its own says nothing of floats.
+    with pytest.raises(ValueError, match='encoding="srgb" is for uint8 and uint16, got float64'):
+        write_image(path, signal, encoding="srgb")
+
+
+@pytest.mark.parametrize(
+    ("name", "tolerance"), [("a.exr", 0), ("a.hdr", 4e-3), ("a.png", 0), ("a.jpg", 0.05)]
+)
+def test_what_is_written_is_read(tmp_path, name, tolerance):
+    """A display format in 8 bits, by sRGB's curve."""
+    linear = np.asarray(studio(32, 64)) / 1000
+    if name in ("a.exr", "a.hdr"):
+        image = read_environment(write_image(tmp_path / name, linear))
+        np.testing.assert_allclose(image, linear, atol=tolerance, rtol=0)
+        return
+    signal = np.rint(np.asarray(tone_map(jnp.asarray(linear), 100.0)) * 255) / 255
+    path = write_image(tmp_path / name, signal)
+    image = read_environment(path, encoding="srgb")
+    np.testing.assert_allclose(image, srgb_decode(jnp.asarray(signal)), atol=tolerance or 2e-7)
+
+
+def test_bfloat16_is_written(tmp_path):
+    image = jnp.full((2, 2), 0.5, jnp.bfloat16)
+    np.testing.assert_array_equal(load(write_image(tmp_path / "a.exr", image), "float"), 0.5)
 
 
 def test_a_place_that_cannot_be_written(tmp_path):
