@@ -334,3 +334,20 @@ def test_animations_are_said():
     gltf = Gltf(animations=[{}, {}])
     gltf.mesh()
     assert read(gltf, {}).found == ("2 animations ignored: the stored pose is read",)
+
+
+def test_normals_of_any_length():
+    gltf = Gltf()
+    normals = np.float32([[0, 0, 3e38], [3e-38, 0, 4e-38], [0, 0, 0], [np.nan, 0, 1]])
+    gltf.mesh(attributes={"NORMAL": gltf.add(normals)})
+    polygons = read(gltf, {"scale": [1e100, 1e100, 1e100]})
+    expected = np.array([[0, 0, 1], [0.6, 0, 0.8], [np.nan] * 3, [np.nan] * 3])
+    np.testing.assert_allclose(polygons.normals, expected[polygons.corners], rtol=1e-7)
+
+
+def test_positions_beyond_all_numbers_are_left_to_cleaning():
+    gltf = Gltf()
+    gltf.mesh()
+    gltf.entry("nodes", children=[1], scale=[1e300, 1, 1])
+    positions = read(gltf, {"scale": [1e300, 1, 1]}).positions
+    assert np.isinf(positions[1, 0])

@@ -17,6 +17,8 @@ from ._polygons import Polygons
 _BLOCK = 2**14
 
 
+# Numbers too large give infinite positions, which are for cleaning to find.
+@np.errstate(all="ignore")
 def read_gltf(path: Path, data: bytes) -> Polygons:
     """Read the bytes of a .glb or .gltf file; files that it names are looked for beside `path`.
 
@@ -27,13 +29,11 @@ def read_gltf(path: Path, data: bytes) -> Polygons:
     """
     document = open_document(path, data)
     materials = Materials(document)
-    # Numbers too large give infinite positions, which are for cleaning to find.
-    with np.errstate(all="ignore"):
-        parts = [
-            part
-            for placement in placements(document)
-            for part in _placed(document, materials, placement)
-        ]
+    parts = [
+        part
+        for placement in placements(document)
+        for part in _placed(document, materials, placement)
+    ]
     materials.note_unread()
     document.note(
         "animations ignored: the stored pose is read",
@@ -158,8 +158,9 @@ def _joined(parts: list[Part], materials: Materials, found: tuple[str, ...]) -> 
 
     normals = joined("normals", 3)
     if normals is not None:
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        normals = np.where((length > 0) & (length < np.inf), normals / length, np.nan)
+        # First by the largest component: squares of very long or short ones leave the range.
+        normals /= np.abs(normals).max(axis=1, keepdims=True, initial=0)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     rows = np.repeat([part.material for part in parts], [len(face) for face in faces])
     return Polygons(
         np.concatenate([np.zeros((0, 3)), *(part.positions for part in parts)]),

@@ -36,16 +36,19 @@ def decode_draco(
     try:
         mesh = DracoPy.decode(bytes(view))
         corners = np.asarray(mesh.faces, np.int64).reshape(-1)
+        found = len(mesh.points)
     except Exception as error:  # of any kind, where the bytes are damaged
         raise ValueError(f"{owner} has damaged bytes of {_NAME}: {error}") from None
-    announced, found = whole(position, "count", owner), len(mesh.points)
+    announced = whole(position, "count", owner)
     if found != announced or corners.max(initial=0) >= found:
-        raise ValueError(f"{owner} announces {announced} vertices, but {_NAME} packs {found}")
+        raise ValueError(
+            f"{owner} announces {shown(announced)} vertices, but {_NAME} packs {found}"
+        )
     unpacked = {}
     for name, number in inner(packed, "attributes", owner).items():
         stored = mesh.get_attribute_by_unique_id(whole({name: number}, name, owner))
         if stored is None or name not in attributes:
-            raise ValueError(f"{owner} names an attribute {name!r} that {_NAME} does not pack")
+            raise ValueError(f"{owner} names an attribute {shown(name)} that {_NAME} does not pack")
         fields = document.item("accessors", whole(attributes, name, owner), owner)
         data = np.asarray(stored["data"]).reshape(found, -1)
         kind = text(fields, "type", name)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from ._gltf_accessors import read_accessor
 from ._gltf_container import Document
-from ._gltf_json import Fields, extension, flag, indices, inner, listed, numbers, whole
+from ._gltf_json import Fields, extension, flag, indices, inner, listed, numbers, shown, whole
 
 # The pose of a node, by default none.
 _REST = {
@@ -67,7 +67,9 @@ def _world_matrices(nodes: list[Fields], children: list[list[int]]) -> Float[np.
     for index, own in enumerate(children):
         for child in own:
             if child >= len(nodes):
-                raise ValueError(f"node {index} names node {child}, but there are {len(nodes)}")
+                raise ValueError(
+                    f"node {index} names node {shown(child)}, but there are {len(nodes)}"
+                )
             if parents[child] >= 0:
                 raise ValueError(f"node {child} is a child of both {parents[child]} and {index}")
             parents[child] = index
@@ -101,7 +103,7 @@ def _shown_nodes(
         roots = indices(document.item("scenes", number, "the file"), "nodes", title)
         for root in roots:
             if root >= len(nodes):
-                raise ValueError(f"{title} names node {root}, but there are {len(nodes)}")
+                raise ValueError(f"{title} names node {shown(root)}, but there are {len(nodes)}")
             if nested[root]:
                 raise ValueError(f"{title} names node {root}, which is a child of another")
     else:
@@ -222,7 +224,7 @@ def _joint_matrices(
     if not joints:
         raise ValueError(f"{name} has no joints")
     if max(joints) >= len(world):
-        raise ValueError(f"{name} names node {max(joints)}, but there are {len(world)}")
+        raise ValueError(f"{name} names node {shown(max(joints))}, but there are {len(world)}")
     if fields.get("inverseBindMatrices") is None:
         return world[joints]
     title = f"inverseBindMatrices of {name}"
