@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._core.pictures import as_picture, as_radiance
 from .._core.xla import keep_rows
 from ._camera import Camera
 
@@ -18,7 +19,7 @@ def look_up(
     `environment`. Directions need no unit length, if their squares stay in range; zero is taken
     for +z. Between the outermost pixel centers and a pole the look-up runs to the mean of the
     outermost row, so that the pole has one value from all sides. Raises `ValueError` for wrong
-    shapes.
+    shapes, also of a picture that is less than 1.5 times as wide as high, and for integers.
 
     Linear and differentiable in `environment`; in the directions too, with kinks between pixels,
     where a slope is that of one side, and zero slope at the poles. Runs under `jit` and `vmap`;
@@ -32,10 +33,11 @@ def look_up(
     >>> imaging.look_up(imaging.studio(16, 32), up_and_front).shape
     (2, 3)
     """
-    if environment.ndim != 3 or directions.ndim == 0 or directions.shape[-1] != 3:
+    environment = as_picture("environment", environment, lat_long=True)
+    directions = as_radiance("directions", directions)
+    if directions.ndim == 0 or directions.shape[-1] != 3:
         raise ValueError(
-            f"expected an environment (height, width, channels) and directions (..., 3), got "
-            f"shapes {environment.shape} and {directions.shape}"
+            f"expected directions (..., 3) with x, y, z last, got shape {directions.shape}"
         )
     return keep_rows(_look_up, environment, directions, like=directions, axis=0, out=0)
 
@@ -44,7 +46,7 @@ def backdrop(environment: Float[Array, "height width c"], camera: Camera) -> Flo
     """Show the environment as the camera sees it through its pixel centers, for `interpolate`.
 
     Gives (camera.height, camera.width, c) in the dtype of `environment`. Differentiable as
-    `look_up`, in the environment and in the camera.
+    `look_up`, in the environment and in the camera. Raises `ValueError` as it does.
 
     **Example**
 
@@ -53,7 +55,9 @@ def backdrop(environment: Float[Array, "height width c"], camera: Camera) -> Flo
     >>> imaging.backdrop(imaging.studio(16, 32), camera).shape
     (4, 6, 3)
     """
-    return _backdrop(environment, camera)
+    if not isinstance(camera, Camera):
+        raise TypeError(f"expected camera as a Camera, got {type(camera).__name__}")
+    return _backdrop(as_picture("environment", environment, lat_long=True), camera)
 
 
 @eqx.filter_jit

@@ -10,18 +10,18 @@ from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
 from .._core.linalg import einsum
+from .._core.pictures import as_picture, as_radiance
 from .._core.xla import keep_rows
 
 _LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec. 709
 
 
-@jax.jit
 def srgb_encode(linear: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     """Encode linear light in [0, 1] as sRGB's signal (IEC 61966-2-1), by the exact two-part curve.
 
     Takes any shape. Below 0 the linear part goes on, above 1 the power. Differentiable, with
     finite gradients everywhere; the curve has its small standard kink (and step, 3e-8) at
-    0.0031308.
+    0.0031308. Raises `ValueError` for integers.
 
     **Example**
 
@@ -30,16 +30,21 @@ def srgb_encode(linear: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     >>> round(float(imaging.srgb_encode(jnp.asarray(0.18))), 3)
     0.461
     """
+    return _srgb_encode(as_radiance("linear", linear))
+
+
+@jax.jit
+def _srgb_encode(linear: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     low = linear <= 0.0031308
     power = jnp.where(low, 0.0031308, linear) ** (1 / 2.4)
     return jnp.where(low, 12.92 * linear, 1.055 * power - 0.055)
 
 
-@jax.jit
 def srgb_decode(signal: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     """Decode sRGB's signal to linear light: the inverse of `srgb_encode`.
 
-    Takes any shape. Differentiable, with the same kink.
+    Takes any shape; 8 bits as `image / 255`. Differentiable, with the same kink. Raises
+    `ValueError` for integers.
 
     **Example**
 
@@ -48,6 +53,11 @@ def srgb_decode(signal: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     >>> round(float(imaging.srgb_decode(jnp.asarray(0.5))), 3)
     0.214
     """
+    return _srgb_decode(as_radiance("signal", signal))
+
+
+@jax.jit
+def _srgb_decode(signal: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     low = signal <= 0.04045
     power = ((jnp.where(low, 0.04045, signal) + 0.055) / 1.055) ** 2.4
     return jnp.where(low, signal / 12.92, power)
@@ -70,8 +80,8 @@ def tone_map(
 
     Differentiable in image, exposure and white; the gradient is zero where the result is clipped.
     Pixel by pixel, so it shards along any axis but the colors'.
-    Raises `ValueError` for an unknown curve, a last axis that is not R, G, B, and, where it is
-    concrete, a white that is not above 0.
+    Raises `ValueError` for an unknown curve, a last axis that is not R, G, B, integers, and,
+    where it is concrete, a white that is not above 0.
 
     **Example**
 
@@ -83,6 +93,7 @@ def tone_map(
     """
     if curve not in ("clip", "reinhard"):
         raise ValueError(f'curve must be "clip" or "reinhard", got {curve!r}')
+    image = as_radiance("image", image)
     if curve == "reinhard" and image.shape[-1:] != (3,):
         raise ValueError(f"a luminance needs R, G, B in the last axis, got shape {image.shape}")
     if curve == "reinhard" and not isinstance(white, Tracer) and not white > 0:
@@ -96,7 +107,7 @@ def _tone_map(image, exposure, white, curve: str) -> Float[Array, "*shape"]:
     exposed = image * jnp.asarray(exposure, image.dtype)
     if curve == "reinhard":
         exposed = _reinhard(exposed, white)
-    return srgb_encode(jnp.clip(exposed, 0, 1))
+    return _srgb_encode(jnp.clip(exposed, 0, 1))
 
 
 def _reinhard(
@@ -117,10 +128,10 @@ def auto_exposure(
     """Choose the exposure that takes a percentile of the pixels' largest channel to 1.
 
     Over the pixels of `mask` (h, w) where given. 1 where that percentile is not above zero, or
-    there is no pixel. Raises `ValueError` for a percentile outside [0, 100]. Differentiable in the
-    image. One number for a whole picture: where its rows are shared out they are gathered, for a
-    percentile wants all pixels together (a batch by `vmap` shards); inside `shard_map` it is that
-    of the rows at hand.
+    there is no pixel. Raises `ValueError` for a percentile outside [0, 100], integers and other
+    shapes. Differentiable in the image. One number for a whole picture: where its rows are shared
+    out they are gathered, for a percentile wants all pixels together (a batch by `vmap` shards);
+    inside `shard_map` it is that of the rows at hand.
 
     **Example**
 
@@ -130,6 +141,8 @@ def auto_exposure(
     """
     if not 0 <= percentile <= 100:
         raise ValueError(f"percentile must be between 0 and 100, got {percentile}")
+    image = as_picture("image", image)
+    _check_mask(mask, image)
     exposure = functools.partial(_auto_exposure, percentile=percentile)
     return keep_rows(exposure, image, mask, like=image, axis=0, out=None)
 
@@ -154,7 +167,8 @@ def psnr(
     The mean is over the channels of the pixels in `mask` (h, w), or of all pixels; infinite where
     the pictures are equal there, and NaN where the mask is empty. Differentiable in both pictures,
     with zero gradient where they are equal. Rows may be shared out between devices; inside
-    `shard_map` it is the ratio of the rows at hand.
+    `shard_map` it is the ratio of the rows at hand. Raises `ValueError` for integers, two shapes,
+    another shape of the mask, and, where it is concrete, a peak that is not above 0.
 
     **Example**
 
@@ -164,7 +178,23 @@ def psnr(
     >>> round(float(imaging.psnr(image, image + 0.1)), 3)
     20.0
     """
+    image, reference = as_picture("image", image), as_picture("reference", reference)
+    if image.shape != reference.shape:
+        raise ValueError(
+            f"expected image and reference of one shape, got {image.shape} and {reference.shape}"
+        )
+    _check_mask(mask, image)
+    if not isinstance(peak, Tracer) and not peak > 0:
+        raise ValueError(f"peak must be above 0, got {peak}")
     return _psnr(image, reference, mask, peak)
+
+
+def _check_mask(mask: Bool[Array, "h w"] | None, image: Float[Array, "h w c"]) -> None:
+    if mask is not None and (mask.shape != image.shape[:2] or mask.dtype != bool):
+        raise ValueError(
+            f"expected mask as booleans of shape {image.shape[:2]}, got {mask.dtype} of shape "
+            f"{mask.shape}"
+        )
 
 
 @jax.jit

@@ -6,6 +6,7 @@ from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from .._core.pictures import as_picture
 from ..imaging import auto_exposure, tone_map
 from ..sphere import reconstruct_lat_long
 from ._arrays import read, read_coefficients
@@ -41,7 +42,7 @@ def light(
     **Returns**
 
     The axes, in degrees: φ from 0 to 360 to the right, θ from 0 to 180 downwards. Raises
-    `ValueError` for any other shape and for values that are not finite.
+    `ValueError` for any other shape, for a picture of integers and for values that are not finite.
 
     **Example**
 
@@ -76,6 +77,8 @@ def light(
 
 def _picture(light: ArrayLike, height: int) -> Float[np.ndarray, "h w c"]:
     values = read("light", light)
+    if values.ndim == 3:
+        as_picture("light", light, lat_long=True)
     if values.ndim == 3 and values.shape[-1] in (1, 3) and values.size:
         return values
     if values.ndim == 1 or (values.ndim == 2 and values.shape[0] in (1, 3)):

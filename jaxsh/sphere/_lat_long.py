@@ -13,6 +13,7 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import as_float, check_degree, check_size
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
+from .._core.pictures import as_radiance, check_result, check_shape
 from .._core.xla import keep_rows
 from ..harmonics import degree_of, degrees, index, legendre, orders
 from ._quadrature import fejer_weights
@@ -23,15 +24,18 @@ def project_lat_long(image: Float[ArrayLike, "h w c"], degree: int) -> Float[Arr
 
     **Arguments**
 
-    - `image`: (H, W, C), linear radiance. Row 0 touches +z, column 0 starts at φ = 0 and φ grows to
-      the right (`docs/conventions.md`).
+    - `image`: (H, W, C), linear radiance in floats, about twice as wide as high. Row 0 touches
+      +z, column 0 starts at φ = 0 and φ grows to the right (`docs/conventions.md`).
     - `degree`: the largest l, known at trace time.
 
     **Returns** coefficients (C, K) in the dtype of the picture, exact for a picture of a function
     of degree D where degree + D < H and degree + D < W; the weights are those of `lat_long`.
     Linear and differentiable. Rows, columns or channels may be sharded over a mesh; inside
     `shard_map` a part of a picture would pass for a whole one, so only channels may be. Raises
-    `ValueError` for a picture too small for the degree: height and width must be above 2·degree.
+    `ValueError` for a picture too small for the degree (height and width must be above 2·degree),
+    for integers, which are to be decoded first, for a picture less than 1.5 times as wide as high,
+    or with its channels first, and, on a CPU, for one with NaN or infinite values. Any other grid
+    goes through `project` with `lat_long(H, W)`.
 
     **Example**
 
@@ -41,16 +45,17 @@ def project_lat_long(image: Float[ArrayLike, "h w c"], degree: int) -> Float[Arr
     >>> light.shape, round(float(light[0, 0]), 3)  # √(4π)
     ((3, 9), 3.545)
     """
-    image, degree = as_float(image), check_degree(degree)
-    if image.ndim != 3:
-        raise ValueError(f"expected a picture (height, width, channels), got shape {image.shape}")
+    image, degree = as_radiance("image", image), check_degree(degree)
+    check_shape("image", image.shape, lat_long=True)
     height, width, _ = image.shape
     if min(height, width) <= 2 * degree:
         raise ValueError(
             f"a lat-long picture of {height} rows and {width} columns is too small for degree "
             f"{degree}: both must be above {2 * degree}"
         )
-    return _project(image, degree)
+    coefficients = _project(image, degree)
+    check_result("image", image, coefficients)
+    return coefficients
 
 
 def reconstruct_lat_long(

@@ -35,7 +35,7 @@ def twin(environment, direction):
     return along(i) if t == 0 else along(i) * (1 - t) + along(i + 1) * t
 
 
-@pytest.mark.parametrize("shape", [(8, 16), (5, 7), (1, 1), (1, 2), (2, 1)])
+@pytest.mark.parametrize("shape", [(8, 16), (5, 8), (1, 2), (2, 3)])
 def test_look_up_is_the_slow_twin(rng, shape):
     environment = jnp.asarray(rng.uniform(size=(*shape, 2)))
     directions = rng.normal(size=(300, 3)) * rng.uniform(0.1, 10, size=(300, 1))
@@ -129,7 +129,18 @@ def test_a_mesh_stands_before_its_environment(rng):
 
 
 def test_other_shapes_are_refused(unchecked):
-    with pytest.raises(ValueError, match=r"got shapes \(4, 8\) and \(5, 3\)"):
-        look_up(jnp.ones((4, 8)), jnp.ones((5, 3)))
-    with pytest.raises(ValueError, match=r"got shapes \(4, 8, 3\) and \(3, 5\)"):
+    directions, camera = jnp.ones((5, 3)), Camera((0.0, -2.0, 0.0), (0.0, 0.0, 0.0), width=2)
+    for environment, message in {
+        "gray": (jnp.ones((4, 8)), r"expected environment .* got shape \(4, 8\); a gray one"),
+        "first": (jnp.ones((3, 8, 16)), r"got shape \(3, 8, 16\); channels come last"),
+        "square": (jnp.ones((8, 8, 3)), "twice as wide as high, got width 8 and height 8"),
+        "codes": (jnp.ones((4, 8, 3), jnp.uint8), r"in floats, got uint8.*srgb_decode"),
+    }.values():
+        with pytest.raises(ValueError, match=message):
+            look_up(environment, directions)
+        with pytest.raises(ValueError, match=message):
+            backdrop(environment, camera)
+    with pytest.raises(ValueError, match=r"expected directions \(..., 3\).* got shape \(3, 5\)"):
         look_up(jnp.ones((4, 8, 3)), jnp.ones((3, 5)))
+    with pytest.raises(TypeError, match="expected camera as a Camera, got tuple"):
+        backdrop(jnp.ones((4, 8, 3)), (0, 0, 0))

@@ -129,6 +129,26 @@ def test_auto_exposure_of_nothing_is_one():
         auto_exposure(black, percentile=101.0)
 
 
+def test_pictures_of_integers_and_other_shapes_are_refused(unchecked):
+    codes, light = jnp.full((4, 8, 3), 200, jnp.uint8), jnp.ones((4, 8, 3))
+    for call in (srgb_encode, srgb_decode, tone_map, auto_exposure, lambda x: psnr(x, light)):
+        with pytest.raises(ValueError, match=r"in floats, got uint8.*srgb_decode\(image / 255\)"):
+            call(codes)
+    for call in (auto_exposure, lambda x: psnr(x, x)):
+        with pytest.raises(ValueError, match=r"got shape \(3, 8, 16\); channels come last"):
+            call(jnp.ones((3, 8, 16)))
+        with pytest.raises(ValueError, match=r"\(height, width, channels\), got shape \(8, 16\)"):
+            call(jnp.ones((8, 16)))
+    with pytest.raises(ValueError, match=r"of one shape, got \(4, 8, 3\) and \(4, 8, 1\)"):
+        psnr(light, light[..., :1])
+    for mask in (jnp.ones((8, 4), bool), jnp.ones((4, 8))):
+        for call in (auto_exposure, lambda x, m: psnr(x, x, m)):
+            with pytest.raises(ValueError, match=r"mask as booleans of shape \(4, 8\)"):
+                call(light, mask)
+    with pytest.raises(ValueError, match="peak must be above 0, got 0"):
+        psnr(light, light, peak=0.0)
+
+
 @DTYPES
 def test_psnr_of_known_errors(dtype):
     reference = jnp.full((4, 6, 3), 0.5, dtype)

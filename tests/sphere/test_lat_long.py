@@ -13,7 +13,7 @@ from jax.test_util import check_grads
 
 from jaxsh import harmonics, sphere
 
-SIZES = [(16, 32), (15, 32), (32, 17), (13, 13)]
+SIZES = [(16, 32), (15, 32), (17, 32), (13, 20)]
 
 
 def generic(image, degree):
@@ -64,7 +64,7 @@ def test_project_a_known_picture():
 
 @pytest.mark.parametrize(
     ("of", "onto", "height", "width"),
-    [(6, 6, 13, 13), (6, 6, 64, 13), (9, 3, 13, 13), (0, 0, 1, 1)],
+    [(6, 6, 13, 20), (6, 6, 13, 64), (9, 3, 13, 20), (0, 0, 1, 2)],
 )
 def test_exact_where_the_degrees_stay_below_height_and_width(of, onto, height, width, rng):
     c = rng.normal(size=(1, (of + 1) ** 2))
@@ -95,7 +95,7 @@ def test_shifting_the_columns_turns_about_z(rng):
 
 
 def test_flipping_the_picture_mirrors_the_function(rng):
-    image = rng.normal(size=(15, 20, 1))
+    image = rng.normal(size=(15, 24, 1))
     c = np.asarray(sphere.project_lat_long(image, 7))
     l, m = harmonics.degrees(7), harmonics.orders(7)
     upside_down = sphere.project_lat_long(image[::-1], 7)
@@ -113,7 +113,8 @@ def test_a_constant_picture_has_a_mean_alone():
 @given(st.integers(0, 6), st.integers(1, 9), st.integers(1, 9), st.integers(1, 4))
 def test_reconstruct_then_project_at_any_size(degree, more_rows, more_columns, channels):
     c = np.random.default_rng(0).normal(size=(channels, (degree + 1) ** 2))
-    size = 2 * degree + more_rows, 2 * degree + more_columns
+    height = 2 * degree + more_rows
+    size = height, max(2 * degree + more_columns, -(-3 * height // 2))
     image = sphere.reconstruct_lat_long(c, *size)
     np.testing.assert_allclose(sphere.project_lat_long(image, degree), c, 0, 2e-14)
 
@@ -128,34 +129,32 @@ def test_dtype_is_that_of_the_picture(rng, unchecked):
     np.testing.assert_allclose(
         back, sphere.reconstruct_lat_long(single.astype(jnp.float64), 8, 16), 0, 1e-5
     )
-    white = sphere.project_lat_long(np.ones((6, 6, 1), np.uint8), 0)
-    np.testing.assert_allclose(white, [[np.sqrt(4 * np.pi)]], 1e-15)
 
 
 def test_linear_and_differentiable(rng):
-    image, pull = rng.normal(size=(10, 12, 2)), rng.normal(size=(2, 16))
+    image, pull = rng.normal(size=(10, 16, 2)), rng.normal(size=(2, 16))
     project = functools.partial(sphere.project_lat_long, degree=3)
     check_grads(project, (image,), order=1, modes=["fwd", "rev"], rtol=1e-8)
     gradient = jax.grad(lambda image: jnp.sum(pull * project(image)))(image)
     # the adjoint: weights times reconstruction
-    weights = np.asarray(sphere.lat_long(10, 12).weights).reshape(10, 12, 1)
-    expected = weights * np.asarray(sphere.reconstruct_lat_long(pull, 10, 12))
+    weights = np.asarray(sphere.lat_long(10, 16).weights).reshape(10, 16, 1)
+    expected = weights * np.asarray(sphere.reconstruct_lat_long(pull, 10, 16))
     np.testing.assert_allclose(gradient, expected, 0, 1e-14)
-    reconstruct = functools.partial(sphere.reconstruct_lat_long, height=10, width=12)
+    reconstruct = functools.partial(sphere.reconstruct_lat_long, height=10, width=16)
     check_grads(reconstruct, (pull,), order=1, modes=["fwd", "rev"], rtol=1e-8)
 
 
 def test_jit_and_vmap_agree(rng):
-    images = rng.normal(size=(3, 10, 12, 2))
+    images = rng.normal(size=(3, 10, 16, 2))
     project = functools.partial(sphere.project_lat_long, degree=3)
     expected = np.stack([project(image) for image in images])
     np.testing.assert_allclose(jax.jit(jax.vmap(project))(images), expected, 0, 4e-15)
-    reconstruct = functools.partial(sphere.reconstruct_lat_long, height=10, width=12)
+    reconstruct = functools.partial(sphere.reconstruct_lat_long, height=10, width=16)
     back = np.stack([reconstruct(c) for c in expected])
     np.testing.assert_allclose(jax.jit(jax.vmap(reconstruct))(expected), back, 0, 4e-15)
 
 
-@pytest.mark.parametrize(("height", "width"), [(12, 64), (64, 12), (1, 1)])
+@pytest.mark.parametrize(("height", "width"), [(12, 64), (6, 12), (1, 2)])
 def test_a_picture_too_small_is_refused(height, width):
     message = f"{height} rows and {width} columns is too small for degree 6: both must be above 12"
     with pytest.raises(ValueError, match=message):
@@ -163,8 +162,28 @@ def test_a_picture_too_small_is_refused(height, width):
 
 
 def test_bad_input_is_refused(unchecked):
-    with pytest.raises(ValueError, match=r"picture \(height, width, channels\).*shape \(9, 9\)"):
-        sphere.project_lat_long(np.ones((9, 9)), 2)
+    for image, message in {
+        "gray": (np.ones((9, 18)), r"\(height, width, channels\), got shape \(9, 18\); a gray"),
+        "batch": (np.ones((2, 9, 18, 3)), "jax.vmap"),
+        "empty": (np.ones((0, 0, 3)), r"got shape \(0, 0, 3\)"),
+        "channels first": (np.ones((3, 64, 128)), r"\(3, 64, 128\); channels come last"),
+        "square": (np.ones((9, 9, 1)), "twice as wide .* width 9 and height 9, .* angular map"),
+        "transposed": (np.ones((18, 9, 3)), "width 9 and height 18; is it transposed"),
+        "a cross": (np.ones((24, 32, 3)), "a horizontal cross"),
+        "codes": (np.ones((9, 18, 3), np.uint8), r"got uint8.*srgb_decode\(image / 255\)"),
+        "deep codes": (np.ones((9, 18, 3), np.uint16), r"got uint16.*image / 65535\)"),
+        "integers": (np.ones((9, 18, 3), int), "expected image in floats, got int64"),
+        "a mask": (np.ones((9, 18, 3), bool), "got bool"),
+        "text": ("probe.hdr", "expected image as an array of floats, got str"),
+    }.values():
+        with pytest.raises(ValueError, match=message):
+            sphere.project_lat_long(image, 2)
+    for value in (np.nan, np.inf):
+        image = np.ones((9, 18, 3))
+        image[4, 4, 1] = image[5, 5, 2] = value
+        with pytest.raises(ValueError, match="image must be finite, got 2 of 486 values"):
+            sphere.project_lat_long(image, 2)
+        assert not np.isfinite(jax.jit(sphere.project_lat_long, static_argnums=1)(image, 2)).all()
     with pytest.raises(ValueError, match=r"degree must be an integer >= 0.*got -1"):
         sphere.project_lat_long(np.ones((9, 9, 1)), -1)
     with pytest.raises(ValueError, match=r"coefficients \(channels, K\), got shape \(9,\)"):

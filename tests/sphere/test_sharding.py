@@ -87,11 +87,11 @@ def test_irradiance_of_a_light_for_each_normal(rng):
 
 
 def test_pictures(rng):
-    image = rng.normal(size=(6, 8, 2))
+    image = rng.normal(size=(6, 12, 2))
 
     def channels(image, c):
         return sphere.project_lat_long(image, 2), jnp.moveaxis(
-            sphere.reconstruct_lat_long(c, 6, 8), -1, 0
+            sphere.reconstruct_lat_long(c, 6, 12), -1, 0
         )
 
     # By channel, and by columns, over which each device sums its own. Not in `shard_map`, where a

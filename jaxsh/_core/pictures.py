@@ -1,0 +1,107 @@
+"""Checks of pictures: radiance in floats, height and width before channels, twice as wide as high.
+
+What a mistaken picture would give is a picture too, so each mistake is named with the way to mend
+it. All but the values is known at trace time.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Float
+
+
+def as_radiance(name: str, value: Any) -> Float[Array, "..."]:
+    """Convert to a JAX array of floats, of any shape.
+
+    Raises `ValueError` for what is none: also integers, which hold a picture's code and no light.
+    """
+    array = value
+    if not isinstance(value, Array):
+        try:
+            array = jnp.asarray(value)
+        except (TypeError, ValueError) as error:
+            if isinstance(error, jax.errors.JAXTypeError):  # of tracing
+                raise
+            kind = type(value).__name__
+            raise ValueError(f"expected {name} as an array of floats, got {kind}") from None
+    if not jnp.issubdtype(array.dtype, jnp.floating):
+        raise ValueError(f"expected {name} in floats, got {_decoded(array.dtype)}")
+    return array
+
+
+def as_picture(name: str, value: Any, *, lat_long: bool = False) -> Float[Array, "h w c"]:
+    """Convert to a picture (height, width, channels), with `lat_long` one of the whole sphere.
+
+    Raises `ValueError` for another shape and as `as_radiance` does.
+    """
+    array = as_radiance(name, value)
+    check_shape(name, array.shape, lat_long=lat_long)
+    return array
+
+
+def check_shape(name: str, shape: tuple[int, ...], *, lat_long: bool = False) -> None:
+    """Refuse what is no picture (height, width, channels), with the way to make it one."""
+    hint = ""
+    if len(shape) == 2:
+        hint = "; a gray one needs a last axis of length 1"
+    elif len(shape) == 4:
+        hint = "; for a batch use jax.vmap"
+    elif len(shape) == 3 and _channels_first(shape):
+        hint = "; channels come last, see jax.numpy.moveaxis"
+    elif len(shape) == 3 and 0 not in shape:
+        if lat_long:
+            _check_lat_long(name, *shape[:2])
+        return
+    raise ValueError(f"expected {name} (height, width, channels), got shape {shape}{hint}")
+
+
+def check_result(name: str, picture: Array, result: Array) -> None:
+    """Refuse NaN and infinities of a picture, where sums over it are at hand on a CPU.
+
+    The sums are few and the picture is large: only where they are not finite is it looked at.
+    """
+    if isinstance(result, Tracer) or not result.is_fully_addressable:
+        return
+    if next(iter(result.devices())).platform != "cpu" or np.isfinite(np.asarray(result)).all():
+        return
+    if isinstance(picture, Tracer):
+        return
+    wrong = int((~np.isfinite(np.asarray(picture))).sum())
+    if wrong:
+        raise ValueError(f"{name} must be finite, got {wrong} of {picture.size} values NaN or inf")
+
+
+def _channels_first(shape: tuple[int, ...]) -> bool:
+    """(3, height, width), and not a picture of three rows."""
+    first, height, width = shape
+    return first in (1, 3, 4) and width > 4 and (height != 2 * first or width == 2 * height)
+
+
+def _check_lat_long(name: str, height: int, width: int) -> None:
+    if 2 * width >= 3 * height:
+        return
+    known = {
+        (1, 1): ", the shape of an angular map or a cube's face: see imaging.read_environment",
+        (4, 3): ", the shape of a vertical cross: see imaging.read_environment",
+        (3, 4): ", the shape of a horizontal cross: see imaging.read_environment",
+        (6, 1): ", the shape of a cube: see imaging.read_environment",
+        (2, 1): "; is it transposed?",
+    }
+    likely = [hint for (h, w), hint in known.items() if height * w == width * h]
+    raise ValueError(
+        f"expected {name} to be lat-long, about twice as wide as high, got width {width} and "
+        f"height {height}{''.join(likely)}"
+    )
+
+
+def _decoded(dtype: Any) -> str:
+    if dtype in (jnp.uint8, jnp.uint16):
+        most = jnp.iinfo(dtype).max
+        return (
+            f"{dtype}: the codes of a picture, to be decoded to light by "
+            f"imaging.srgb_decode(image / {most})"
+        )
+    return f"{dtype}"
