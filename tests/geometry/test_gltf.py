@@ -158,6 +158,14 @@ def test_nodes_multiply_from_the_root():
     np.testing.assert_allclose(triangles(read(gltf)), expected[FACES], atol=1e-12)
 
 
+def test_a_matrix_comes_before_its_parts():
+    gltf = Gltf()
+    gltf.mesh()
+    polygons = read(gltf, {"matrix": np.eye(4).ravel().tolist(), "scale": [2, 2, 2], "skin": None})
+    np.testing.assert_array_equal(polygons.positions, CORNERS)
+    assert polygons.found == ("1 nodes have both a matrix and its parts: the matrix is taken",)
+
+
 @pytest.mark.parametrize("scale", [[-1, 1, 1], [2, -3, 4], [-1, -1, -1], [-1, -2, 1]])
 def test_mirrored_nodes_keep_outside_outside(scale):
     gltf = Gltf()

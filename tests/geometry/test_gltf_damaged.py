@@ -44,7 +44,7 @@ def test_bytes_after_the_end_and_unknown_chunks():
 def test_cut_off(length):
     data = tetrahedron().glb()
     assert length < len(data)
-    with pytest.raises(ValueError, match=r"JSON is damaged|breaks off|announces \d+ bytes, but"):
+    with pytest.raises(ValueError, match=r"begins with|breaks off|announces \d+ bytes, but"):
         read(data[:length])
 
 
@@ -73,7 +73,10 @@ def test_headers(change, message):
         (b"{}", "names no version of glTF"),
         (b'{"asset": {"version": "1.0"}}', "glTF '1.0', and only glTF 2"),
         (b'{"asset": {"version": "2.1", "minVersion": "2.1"}}', "asks for glTF '2.1'"),
-        (b'{"asset": {"version": 2}}', "should have text as 'version', got 2"),
+        (b'{"asset": {"version": 1}}', "glTF '1', and only glTF 2"),
+        (b'{"asset": {"version": 2.0}}', "holds no faces .no mesh in its scene"),
+        (b"solid a", "begins with b'soli': neither the mark glTF nor JSON"),
+        ('{"asset": 1}'.encode("utf-16"), "neither the mark glTF nor JSON"),
         (b'{"asset": {"version": "2.0"}, "meshes": {}}', "a list as 'meshes', got an object of 0"),
     ],
 )

@@ -44,6 +44,9 @@ def read_gltf(path: Path, data: bytes) -> Polygons:
         "material variants ignored: the default is read",
         len(listed(variants, "variants", "KHR_materials_variants")),
     )
+    if not parts:
+        reasons = ", ".join(document.found) or "no mesh in its scene"
+        raise ValueError(f"it holds no faces ({reasons})")
     return _joined(parts, materials, document.found)
 
 
@@ -54,7 +57,7 @@ def _placed(document: Document, materials: Materials, placement: Placement) -> I
         if placement.joints is not None and part.joints is not None:
             yield _skinned(document, part, placement)
         else:
-            document.spend(part.faces.size * (len(placement.matrices) - 1))
+            document.spend(part.faces.size * max(len(placement.matrices) - 1, 0))
             yield _copied(part, placement.matrices)
 
 
@@ -138,8 +141,7 @@ def _cofactors(
 
 def _joined(parts: list[Part], materials: Materials, found: tuple[str, ...]) -> Polygons:
     """Put all parts in a row, and what their vertices carry at each corner."""
-    sizes = [len(part.positions) for part in parts]
-    offsets = np.cumsum([0, *sizes])[:-1]
+    offsets = np.cumsum([0, *(len(part.positions) for part in parts)])[:-1]
     faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=True)]
     count = sum(map(len, faces))
 
@@ -163,8 +165,8 @@ def _joined(parts: list[Part], materials: Materials, found: tuple[str, ...]) -> 
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     rows = np.repeat([part.material for part in parts], [len(face) for face in faces])
     return Polygons(
-        np.concatenate([np.zeros((0, 3)), *(part.positions for part in parts)]),
-        np.concatenate([np.zeros(0, np.int64), *(face.ravel() for face in faces)]),
+        np.concatenate([part.positions for part in parts]),
+        np.concatenate([face.ravel() for face in faces]),
         np.full(count, 3),
         normals,
         joined("uv", 2),

@@ -153,6 +153,8 @@ def open_document(path: Path, data: bytes) -> Document:
         source, chunk, trailing = _split(data)
     else:
         source = memoryview(data)
+        if not data.removeprefix(b"\xef\xbb\xbf").lstrip().startswith((b"{", b"[")):
+            raise ValueError(f"it begins with {data[:4]!r}: neither the mark glTF nor JSON")
     fields = _parse(source)
     document = Document(path.parent, fields, chunk, len(data))
     document.note("bytes after its end ignored", trailing)
@@ -171,7 +173,7 @@ def _split(data: bytes) -> tuple[memoryview, memoryview | None, int]:
     version, length = struct.unpack_from("<2I", data, 4)
     if version != 2:
         raise ValueError(f"it is glTF {version} in binary form, and only glTF 2 can be read")
-    if length > len(data):
+    if not 20 <= length <= len(data):
         raise ValueError(f"it announces {length} bytes, but has {len(data)}")
     content = memoryview(data)[:length]
     chunks: list[tuple[int, memoryview]] = []
@@ -212,8 +214,10 @@ def _parse(source: memoryview) -> Fields:
 
 def _check_version(fields: Fields) -> None:
     asset = inner(fields, "asset", "the file")
-    version = text(asset, "version", "the asset")
-    if version is None:
+    version = asset.get("version")
+    if isinstance(version, int | float):
+        version = str(version)
+    if not isinstance(version, str):
         raise ValueError("it names no version of glTF (asset.version)")
     if version.split(".")[0] != "2":
         raise ValueError(f"it is glTF {shown(version)}, and only glTF 2 can be read")

@@ -23,7 +23,8 @@ def numbers(
     fields: Fields, key: str, owner: str, length: int | None, default: list[float] | None
 ) -> list[float]:
     """Take a list of finite numbers, `length` of them where that is given."""
-    value = fields.get(key, default)
+    value = fields.get(key)
+    value = default if value is None else value
     if (
         not isinstance(value, list)
         or (length is not None and len(value) != length)
@@ -82,7 +83,8 @@ def text(fields: Fields, key: str, owner: str) -> str | None:
 
 def flag(fields: Fields, key: str, owner: str, default: bool = False) -> bool:
     """Take true or false."""
-    value = fields.get(key, default)
+    value = fields.get(key)
+    value = default if value is None else value
     if not isinstance(value, bool):
         raise ValueError(f"{owner} should have true or false as {key!r}, got {shown(value)}")
     return value

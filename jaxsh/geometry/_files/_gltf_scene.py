@@ -41,7 +41,7 @@ def placements(document: Document) -> Iterator[Placement]:
         return
     nodes = [document.item("nodes", index, "the file") for index in range(count)]
     children = [indices(node, "children", f"node {i}") for i, node in enumerate(nodes)]
-    world = _world_matrices(nodes, children)
+    world = _world_matrices(document, nodes, children)
     reached = np.zeros(count, bool)
     # Copies of one mesh that differ by their matrix only are placed together.
     together: dict[int, list[Placement]] = {}
@@ -61,7 +61,9 @@ def placements(document: Document) -> Iterator[Placement]:
     document.note("nodes with meshes outside the scene ignored", hidden)
 
 
-def _world_matrices(nodes: list[Fields], children: list[list[int]]) -> Float[np.ndarray, "n 4 4"]:
+def _world_matrices(
+    document: Document, nodes: list[Fields], children: list[list[int]]
+) -> Float[np.ndarray, "n 4 4"]:
     """Multiply the matrices of all ancestors, from the roots down."""
     parents = [-1] * len(nodes)
     for index, own in enumerate(children):
@@ -73,7 +75,7 @@ def _world_matrices(nodes: list[Fields], children: list[list[int]]) -> Float[np.
             if parents[child] >= 0:
                 raise ValueError(f"node {child} is a child of both {parents[child]} and {index}")
             parents[child] = index
-    world = _local_matrices(nodes)
+    world = _local_matrices(document, nodes)
     waiting = [index for index, parent in enumerate(parents) if parent < 0]
     done = 0
     while waiting:
@@ -133,7 +135,9 @@ def _placement(
     document: Document, node: Fields, world: Float[np.ndarray, "n 4 4"], index: int
 ) -> Placement:
     owner = f"node {index}"
-    weights = numbers(node, "weights", owner, None, None) if "weights" in node else None
+    weights = None
+    if node.get("weights") is not None:
+        weights = numbers(node, "weights", owner, None, None)
     copies = extension(node, "EXT_mesh_gpu_instancing", owner)
     matrices = world[index : index + 1]
     joints = None
@@ -146,18 +150,18 @@ def _placement(
     return Placement(whole(node, "mesh", owner), weights, matrices, joints, owner)
 
 
-def _local_matrices(nodes: list[Fields]) -> Float[np.ndarray, "n 4 4"]:
-    given = [node.get("matrix") is not None for node in nodes]
-    parts = [
-        [
-            numbers({} if matrix else node, key, f"node {i}", len(default), default)
-            for i, (node, matrix) in enumerate(zip(nodes, given, strict=True))
-        ]
-        for key, default in _REST.items()
-    ]
-    translation, rotation, scale = map(np.array, parts)
-    local = _trs(translation, rotation, scale, "node")
-    for i in np.flatnonzero(given):
+def _local_matrices(document: Document, nodes: list[Fields]) -> Float[np.ndarray, "n 4 4"]:
+    given = [i for i, node in enumerate(nodes) if node.get("matrix") is not None]
+    parts = {key: np.tile(default, (len(nodes), 1)) for key, default in _REST.items()}
+    for i, node in enumerate(nodes):
+        for key, values in parts.items():
+            if node.get(key) is not None:
+                values[i] = numbers(node, key, f"node {i}", values.shape[1], None)
+    both = sum(any(nodes[i].get(key) is not None for key in _REST) for i in given)
+    document.note("nodes have both a matrix and its parts: the matrix is taken", both)
+    parts["rotation"][given] = _REST["rotation"]
+    local = _trs(**parts, owner="node")
+    for i in given:
         local[i] = np.array(numbers(nodes[i], "matrix", f"node {i}", 16, None)).reshape(4, 4).T
         if not np.allclose(local[i, 3], [0, 0, 0, 1], atol=1e-5):
             raise ValueError(f"node {i} has a matrix whose last row is not 0, 0, 0, 1")
