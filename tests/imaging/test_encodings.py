@@ -1,6 +1,8 @@
 """Panoramas of 8 and 16 bits, written by Pillow, read with the encoding that the caller names."""
 
 import io
+import struct
+import zlib
 
 import numpy as np
 import pytest
@@ -55,6 +57,23 @@ def test_palettes_bits_and_what_the_file_says_of_its_colors(tmp_path, pixels):
     info.add(b"gAMA", (100000).to_bytes(4, "big"))
     Image.fromarray(pixels[..., :3]).save(path, pnginfo=info)
     check(path, pixels[..., :3] / 255)
+
+
+def test_an_interlaced_picture(tmp_path, pixels):
+    """Adam7's seven passes, by hand: the first row and column of each, and their steps."""
+    colors = pixels[..., :3]
+    passes = [(0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2), (0, 1, 2, 2)]
+    rows = [
+        b"\0" + row.tobytes()
+        for y, x, down, right in [*passes, (1, 0, 2, 1)]
+        for row in colors[y::down, x::right]
+    ]
+    header = struct.pack(">IIBBBBB", 16, 8, 8, 2, 0, 0, 1)
+    data = b"\x89PNG\r\n\x1a\n"
+    for chunk in (b"IHDR" + header, b"IDAT" + zlib.compress(b"".join(rows)), b"IEND"):
+        data += struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    (tmp_path / "a.png").write_bytes(data)
+    check(tmp_path / "a.png", colors / 255)
 
 
 TURNED = {
