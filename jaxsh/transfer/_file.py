@@ -4,13 +4,17 @@ import os
 import zipfile
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._core.npy import from_npy
+from .._core.words import reason
 from ..harmonics import degree_of
 from ._transfer import Transfer
 
 _FORMAT, _VERSION = "jaxsh transfer", 1
+_ROOM = 1 << 26  # bytes that a small file may unpack to
 _FIELDS = {"coefficients": "f", "positions": "f", "normals": "f", "neighbors": "i"}
 
 
@@ -71,20 +75,39 @@ def load(path: str | os.PathLike[str]) -> Transfer:
     if not zipfile.is_zipfile(path):
         raise ValueError(f"{path}: not a transfer file, or a truncated one")
     try:
-        # Opened here, since NumPy leaves a damaged archive open.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            arrays = {name: np.asarray(stored[name]) for name in stored.files}
+        arrays = _unpack(path)
     except Exception as error:  # a damaged archive may raise anything
-        reason = str(error).strip().split("\n")[0] or type(error).__name__
-        raise ValueError(f"{path}: damaged: {reason}") from error
+        raise ValueError(f"{path}: damaged: {reason(error)}") from error
     if str(arrays.pop("format", None)) != _FORMAT:
         raise ValueError(f"{path}: not a transfer file")
     version = arrays.pop("version", np.array(0))
-    if version.shape or version.dtype.kind != "i" or not version == _VERSION:
-        raise ValueError(f"{path}: written as version {version}, but this jaxsh reads {_VERSION}")
-    if problem := _problem(arrays):
-        raise ValueError(f"{path}: damaged: {problem}")
+    if version.shape or version.dtype.kind != "i" or version != _VERSION:
+        written = reason(str(version), 40)
+        raise ValueError(f"{path}: written as version {written}, but this jaxsh reads {_VERSION}")
+    # As read, and once more in JAX's types: float32 cannot hold all that float64 can.
+    for change in (lambda array: array, _in_jax_types):
+        arrays = {name: change(array) for name, array in arrays.items()}
+        if problem := _problem(arrays):
+            raise ValueError(f"{path}: damaged: {problem}")
     return Transfer(**{name: jnp.asarray(arrays[name]) for name in _FIELDS})
+
+
+def _in_jax_types(array: np.ndarray) -> np.ndarray:
+    with np.errstate(over="ignore"):
+        return array.astype(jax.dtypes.canonicalize_dtype(array.dtype.newbyteorder("=")))
+
+
+def _unpack(path: Path) -> dict[str, np.ndarray]:
+    """Take the arrays that make a transfer out of an archive."""
+    names = ["format", "version", *_FIELDS]
+    with zipfile.ZipFile(path) as archive:
+        members = set(archive.namelist())
+        stored = {name: f"{name}.npy" for name in names if f"{name}.npy" in members}
+        size = sum(archive.getinfo(file).file_size for file in stored.values())
+        most = 10 * path.stat().st_size + _ROOM
+        if size > most:
+            raise ValueError(f"it unpacks to {size} bytes, and {most} are plausible")
+        return {name: from_npy(archive.read(file)) for name, file in stored.items()}
 
 
 def _problem(arrays: dict[str, np.ndarray]) -> str | None:
@@ -93,8 +116,10 @@ def _problem(arrays: dict[str, np.ndarray]) -> str | None:
         if name not in arrays:
             return f"it holds no {name}"
         array = arrays[name]
-        if array.dtype.kind != kind or array.ndim != 2:
+        if array.dtype.kind != kind or array.dtype.itemsize > 8 or array.ndim != 2:
             return f"{name} have dtype {array.dtype} and shape {array.shape}"
+        if bad := int((~np.isfinite(array)).sum()):
+            return f"{bad} of {array.size} {name} are NaN or infinite"
     count, width = arrays["coefficients"].shape
     if arrays["positions"].shape != (count, 3) or arrays["normals"].shape != (count, 3):
         return f"positions or normals are not ({count}, 3), as its coefficients want"

@@ -105,13 +105,30 @@ def rewritten(path, **changes):
         ({"coefficients": np.zeros((6, 9))}, "damaged: positions or normals are not"),
         ({"coefficients": np.zeros((7, 9), int)}, "damaged: coefficients have dtype int64"),
         ({"neighbors": np.full((7, 2), 7)}, "damaged: neighbors do not name vertices 0 to 6"),
-        ({"neighbors": np.array([{}], object)}, "damaged: Object arrays cannot be loaded"),
+        ({"neighbors": np.array([{}], object)}, "damaged: it holds Python objects, not numbers"),
+        ({"version": np.zeros((99, 9))}, r"written as version \[\[0\. [^\n]{,80}, but this jaxsh"),
+        ({"normals": np.full((7, 3), np.nan)}, "damaged: 21 of 21 normals are NaN or infinite"),
+        ({"positions": np.ones((7, 3), "c8")}, "damaged: positions have dtype complex64"),
     ],
 )
 def test_other_archives_are_refused(tmp_path, changes, message):
     path = rewritten(tmp_path / "a.npz", **changes)
     with pytest.raises(ValueError, match=rf"a\.npz: {message}"):
         load(path)
+
+
+def test_a_small_file_does_not_unpack_into_a_large_one(tmp_path):
+    path = tmp_path / "a.npz"
+    with path.open("wb") as file:
+        np.savez_compressed(file, format="jaxsh transfer", coefficients=np.zeros((5_000_000, 4)))
+    with pytest.raises(ValueError, match=r"a\.npz: damaged: it unpacks to 160000\d+ bytes, and 6"):
+        load(path)
+
+
+def test_other_orders_of_bytes_are_read(tmp_path):
+    given = np.asarray(transfer().normals)
+    path = rewritten(tmp_path / "a.npz", normals=given.astype(">f4"))
+    np.testing.assert_array_equal(load(path).normals, given)
 
 
 def test_a_missing_file_is_named(tmp_path):
@@ -130,3 +147,6 @@ def test_doubles_become_floats_without_x64(tmp_path):
     path = save(tmp_path / "a", transfer(dtype=np.float64))
     with jax.enable_x64(False):
         assert load(path).coefficients.dtype == np.float32
+        large = rewritten(tmp_path / "b", coefficients=np.full((7, 9), 1e39))
+        with pytest.raises(ValueError, match="b: damaged: 63 of 63 coefficients are NaN or inf"):
+            load(large)

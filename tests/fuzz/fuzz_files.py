@@ -1,0 +1,348 @@
+"""Small valid files of every format that is read, as bytes: what the fuzzer starts from."""
+
+import functools
+import io
+import json
+import struct
+import tempfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+# A prism over an L: concave, watertight, a quad or an L a side; all coordinates exact in decimal.
+_RING = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 3], [0, 3]]) / 2
+POINTS = np.concatenate([np.c_[_RING, np.zeros(6)], np.c_[_RING, np.full(6, 0.75)]])
+POLYGONS = [
+    [5, 4, 3, 2, 1, 0],
+    [6, 7, 8, 9, 10, 11],
+    *([i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6] for i in range(6)),
+]
+# The same as triangles: the L's by hand.
+_CAP = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)]
+TRIANGLES = np.array(
+    [(c, b, a) for a, b, c in _CAP]
+    + [(a + 6, b + 6, c + 6) for a, b, c in _CAP]
+    + [t for a, b, c, d in POLYGONS[2:] for t in ((a, b, c), (a, c, d))]
+)
+_COLORS = np.arange(48).reshape(12, 4) * 5 % 256
+_UV = POINTS[:, :2] / 2 + 0.125
+
+
+def _obj() -> list[bytes]:
+    lines = [f"v {x:g} {y:g} {z:g}" for x, y, z in POINTS]
+    plain = [*lines, *("f " + " ".join(str(i + 1) for i in p) for p in POLYGONS)]
+    full = [
+        "# an L", "mtllib scene.mtl", "o one",
+        *(f"v {x:g} {y:g} {z:g} {r / 255:.6f} {g / 255:.6f} {b / 255:.6f}"
+          for (x, y, z), (r, g, b, _) in zip(POINTS, _COLORS, strict=True)),
+        *(f"vt {u:g} {v:g}" for u, v in _UV), "vn 0 0 -1", "vn 0 0 1", "vn 0.6 0.8 0",
+        "s off", "g caps", "usemtl red",
+        *("f " + " ".join(f"{i + 1}/{i + 1}/{n}" for i in p)
+          for n, p in enumerate(POLYGONS[:2], 1)),
+        "g walls", "usemtl blue",
+        *("f " + " ".join(f"{i - 12}//-1" for i in p) for p in POLYGONS[2:5]),
+        *("f " + " ".join(f"{i + 1}/{i + 1}" for i in p[:2]) + " \\\n " +
+          " ".join(f"{i + 1}/{i + 1}" for i in p[2:]) for p in POLYGONS[5:]),
+        "l 1 2", "p 1",
+    ]  # fmt: skip
+    return ["\n".join(text).encode() + b"\n" for text in (plain, full)]
+
+
+def _off() -> list[bytes]:
+    points = [" ".join(f"{c:g}" for c in p) for p in POINTS]
+    faces = [" ".join(map(str, [len(p), *p])) for p in POLYGONS]
+    plain = ["OFF", "12 8 18", *points, *faces]
+    glued = ["OFF12 8 0", "# a comment", "", *points, *(f"{face} 255 0 0" for face in faces)]
+    rows = zip(points, _COLORS.tolist(), strict=True)
+    colored = ["COFF", "12 8 0", *(f"{p} {r} {g} {b} {a}" for p, (r, g, b, a) in rows), *faces]
+    head = b"OFF BINARY\n" + struct.pack(">3i", 12, 8, 0)
+    body = POINTS.astype(">f4").tobytes()
+    body += b"".join(struct.pack(f">{len(p) + 2}i", len(p), *p, 0) for p in POLYGONS)
+    return [*("\n".join(text).encode() + b"\n" for text in (plain, glued, colored)), head + body]
+
+
+def _stl() -> list[bytes]:
+    corners = POINTS[TRIANGLES]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    rows = np.concatenate([normals[:, None], corners], axis=1).reshape(-1, 12)
+    binary = b"made by hand".ljust(80) + struct.pack("<I", len(rows))
+    binary += b"".join(struct.pack("<12fH", *row, 0) for row in rows)
+    facets = [
+        "facet normal {:g} {:g} {:g}\n outer loop\n"
+        "  vertex {:g} {:g} {:g}\n  vertex {:g} {:g} {:g}\n  vertex {:g} {:g} {:g}\n"
+        " endloop\nendfacet\n".format(*row)
+        for row in rows
+    ]
+    one = "solid one\n" + "".join(facets) + "endsolid one\n"
+    two = "".join(f"solid {i}\n{''.join(facets[i::2])}endsolid\n" for i in range(2))
+    return [binary, one.encode(), two.encode()]
+
+
+def _ply() -> list[bytes]:
+    fields = {"x": "float", "y": "float", "z": "float"}
+    more = {"nx": "float", "ny": "float", "nz": "double", "s": "float", "t": "float"}
+    more |= {"red": "uchar", "green": "uchar", "blue": "uchar", "alpha": "uchar"}
+    codes = {"float": "f", "double": "d", "uchar": "B"}
+
+    def header(form, kinds, count="uchar", index="int"):
+        return "\n".join([
+            "ply", f"format {form} 1.0", "comment made by hand", "element vertex 12",
+            *(f"property {kind} {name}" for name, kind in kinds.items()), "element face 8",
+            f"property list {count} {index} vertex_indices", "end_header\n",
+        ]).encode()  # fmt: skip
+
+    normals = np.tile([0.6, 0.0, 0.8], (12, 1))
+    rows = np.c_[POINTS, normals, _UV, _COLORS]
+    text = "".join(" ".join(f"{c:g}" for c in row) + "\n" for row in rows)
+    text += "".join(" ".join(map(str, [len(p), *p])) + "\n" for p in POLYGONS)
+    files = [header("ascii", fields | more) + text.encode()]
+    for order, name in (("<", "little"), (">", "big")):
+        kinds = fields | more
+        form = "".join(codes[kind] for kind in kinds.values())
+        body = b"".join(struct.pack(order + form, *row[:8], *map(int, row[8:])) for row in rows)
+        body += b"".join(struct.pack(f"{order}B{len(p)}i", len(p), *p) for p in POLYGONS)
+        files.append(header(f"binary_{name}_endian", kinds) + body)
+    plain = b"".join(struct.pack("<3f", *p) for p in POINTS)
+    plain += b"".join(struct.pack(f"<I{len(p)}H", len(p), *p) for p in POLYGONS)
+    files.append(header("binary_little_endian", fields, "uint", "ushort") + plain)
+    strips = [[0, 1, 7, -1], [7, 6, 0, 1, -1]]
+    body = struct.pack("<I9i", 9, *strips[0], *strips[1])
+    points = b"".join(struct.pack("<3f", *p) for p in POINTS)
+    head = header("binary_little_endian", fields).replace(
+        b"element face 8\nproperty list uchar int vertex_indices",
+        b"element tristrips 1\nproperty list uint int vertex_indices",
+    )
+    return [*files, head + points + body]
+
+
+def glb(content: dict, body: bytes) -> bytes:
+    """Put JSON and a buffer into the container of glTF."""
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    body += bytes(-len(body) % 4)
+    size = 28 + len(text) + len(body)
+    head = struct.pack("<4sIII4s", b"glTF", 2, size, len(text), b"JSON")
+    return head + text + struct.pack("<I4s", len(body), b"BIN\0") + body
+
+
+def _glb() -> list[bytes]:
+    turned = POINTS[:, [0, 2, 1]] * [1, 1, -1]
+    parts = [
+        turned.astype("<f4").tobytes(),
+        TRIANGLES.astype("<u2").tobytes(),
+        np.tile(np.array([0.6, 0.8, 0]), (12, 1)).astype("<f4").tobytes(),
+        _UV.astype("<f4").tobytes(),
+        _COLORS.astype("u1").tobytes(),
+        np.array([3], "<u2").tobytes(),
+        np.array([[0.5, 0.25, 0.125]], "<f4").tobytes(),
+        _PNG,
+    ]
+    views, offset = [], 0
+    for part in parts:
+        views.append({"buffer": 0, "byteOffset": offset, "byteLength": len(part)})
+        offset += len(part) + -len(part) % 4
+    body = b"".join(part + bytes(-len(part) % 4) for part in parts)
+    bounds = {"min": turned.min(axis=0).tolist(), "max": turned.max(axis=0).tolist()}
+    accessors = [
+        {"bufferView": 0, "componentType": 5126, "count": 12, "type": "VEC3", **bounds},
+        {"bufferView": 1, "componentType": 5123, "count": TRIANGLES.size, "type": "SCALAR"},
+        {"bufferView": 2, "componentType": 5126, "count": 12, "type": "VEC3"},
+        {"bufferView": 3, "componentType": 5126, "count": 12, "type": "VEC2"},
+        {"bufferView": 4, "componentType": 5121, "count": 12, "type": "VEC4", "normalized": True},
+    ]
+    primitive = {"attributes": {"POSITION": 0}, "indices": 1}
+    content = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [primitive]}],
+        "accessors": accessors[:2],
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(body)}],
+    }
+    attributes = {"POSITION": 0, "NORMAL": 2, "TEXCOORD_0": 3, "COLOR_0": 4}
+    full = {
+        **content,
+        "nodes": [
+            {"children": [1, 2], "scale": [1, 1, 2]},
+            {"mesh": 0, "translation": [0, 5, 0], "rotation": [0, 0.6, 0, 0.8]},
+            {"mesh": 0, "matrix": [2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -9, 1]},
+        ],
+        "meshes": [{"primitives": [{"attributes": attributes, "indices": 1, "material": 0}]}],
+        "materials": [{
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [0.5, 0.25, 1, 1], "baseColorTexture": {"index": 0}
+            },
+            "doubleSided": True,
+        }],
+        "textures": [{"source": 0}],
+        "images": [{"bufferView": 7, "mimeType": "image/png"}],
+        "accessors": accessors,
+    }  # fmt: skip
+    sparse = {
+        "count": 1,
+        "indices": {"bufferView": 5, "componentType": 5123},
+        "values": {"bufferView": 6},
+    }
+    lifted = {**content, "accessors": [{**accessors[0], "sparse": sparse}, accessors[1]]}
+    strip = {"attributes": {"POSITION": 0}, "mode": 5}
+    strips = {**content, "meshes": [{"primitives": [strip, {**strip, "mode": 6}]}]}
+    return [glb(one, body) for one in (content, full, lifted, strips)]
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+_PNG = (
+    b"\x89PNG\r\n\x1a\n"
+    + _chunk(b"IHDR", struct.pack(">IIBBBBB", 2, 2, 8, 2, 0, 0, 0))
+    + _chunk(b"IDAT", zlib.compress(b"\0" + bytes(range(6)) + b"\0" + bytes(range(100, 106))))
+    + _chunk(b"IEND", b"")
+)
+
+HEIGHT, WIDTH = 8, 16
+
+
+def picture() -> np.ndarray:
+    """A lat-long picture (8, 16, 3), float32, all its values exact in a half and in RGBE."""
+    i, j, c = np.meshgrid(np.arange(HEIGHT), np.arange(WIDTH), np.arange(3), indexing="ij")
+    return (2.0 ** ((i + j) % 5 - 2) * (1 + (i * j + c) % 4 / 4)).astype(np.float32)
+
+
+def _hdr() -> list[bytes]:
+    pixels = picture()
+    largest = pixels.max(axis=2)
+    exponent = np.frexp(largest)[1]
+    scaled = pixels / np.exp2(exponent - 8.0)[..., None]
+    rgbe = np.concatenate([scaled, exponent[..., None] + 128.0], axis=2).astype(np.uint8)
+    head = b"#?RADIANCE\n# made by hand\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=1.0\n\n-Y 8 +X 16\n"
+    rows = []
+    for row in rgbe:
+        rows.append(struct.pack(">BBH", 2, 2, WIDTH))
+        for channel in row.T:
+            rows.append(bytes([4, *channel[:4], 128 + 1, channel[4], 11, *channel[5:]]))
+    return [head + rgbe.tobytes(), head + b"".join(rows)]
+
+
+def _exr() -> list[bytes]:
+    import OpenImageIO as oiio
+
+    files = []
+    with tempfile.TemporaryDirectory() as folder:
+        for kind, compression, tile in [
+            ("half", "none", 0), ("float", "zip", 0), ("half", "piz", 0), ("float", "rle", 8),
+            ("half", "zips", 0), ("half", "pxr24", 0), ("half", "b44", 4), ("half", "dwaa", 0),
+        ]:  # fmt: skip
+            path = str(Path(folder) / "a.exr")
+            spec = oiio.ImageSpec(WIDTH, HEIGHT, 3, kind)
+            spec.attribute("compression", compression)
+            if tile:
+                spec.tile_width = spec.tile_height = tile
+            out = oiio.ImageOutput.create(path)
+            out.open(path, spec)
+            out.write_image(picture())
+            out.close()
+            files.append(Path(path).read_bytes())
+    return files
+
+
+def _pfm() -> list[bytes]:
+    pixels = picture()[::-1]
+    size = f"{WIDTH} {HEIGHT}"
+    return [
+        f"PF\n{size}\n-1.0\n".encode() + pixels.astype("<f4").tobytes(),
+        f"PF\n{size}\n1.0\n".encode() + pixels.astype(">f4").tobytes(),
+        f"Pf\n{size}\n-2.5e1\n".encode() + pixels[..., 1].astype("<f4").tobytes(),
+    ]
+
+
+def npy(array: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
+
+
+def _npy() -> list[bytes]:
+    pixels = picture()
+    arrays = [
+        pixels,
+        pixels.astype(">f8"),
+        np.asfortranarray(pixels),
+        pixels[..., 0],
+        pixels.astype("f2"),
+    ]
+    return [npy(array) for array in arrays]  # fmt: skip
+
+
+def archive(members: dict[str, bytes]) -> bytes:
+    """Put files into a zip archive as they are."""
+    return _zip({name: (zlib.crc32(data), len(data), 0, data) for name, data in members.items()})
+
+
+def compressed_archive(members: dict[str, bytes], zeros: dict[str, int]) -> bytes:
+    """Put files into a zip archive, with arrays of so many rows of zeros, which pack well."""
+    packed = {name: _packed(data) for name, data in members.items()}
+    return _zip(packed | {name: _packed_zeros(rows) for name, rows in zeros.items()})
+
+
+def _packed(data: bytes) -> tuple[int, int, int, bytes]:
+    return zlib.crc32(data), len(data), 8, zlib.compress(data, 1, -15)
+
+
+@functools.cache
+def _packed_zeros(rows: int) -> tuple[int, int, int, bytes]:
+    return _packed(npy(np.zeros((rows, 4), "f4")))
+
+
+def _zip(members: dict[str, tuple[int, int, int, bytes]]) -> bytes:
+    """Write an archive of (CRC, size, method, bytes), which zipfile would have to pack itself."""
+    files, directory = b"", b""
+    for name, (crc, size, method, data) in members.items():
+        fields = (20, 0x800, method, 0, 0x21, crc, len(data), size, len(name.encode()), 0)
+        directory += struct.pack("<4sH5HIIIHH", b"PK\1\2", 20, *fields)
+        directory += struct.pack("<HHHII", 0, 0, 0, 0, len(files)) + name.encode()
+        files += struct.pack("<4s5HIIIHH", b"PK\3\4", *fields) + name.encode() + data
+    count = len(members)
+    end = (b"PK\5\6", 0, 0, count, count, len(directory), len(files), 0)
+    return files + directory + struct.pack("<4s4HIIH", *end)
+
+
+def _transfer() -> list[bytes]:
+    files = []
+    for kind in ("<f4", "<f8"):
+        arrays = {
+            "format": np.array("jaxsh transfer"),
+            "version": np.array(1),
+            "coefficients": (np.arange(20, dtype=kind) / 8).reshape(5, 4),
+            "positions": (np.arange(15, dtype=kind) / 4).reshape(5, 3),
+            "normals": np.tile(np.array([0, 0.6, 0.8], kind), (5, 1)),
+            "neighbors": np.arange(10).reshape(5, 2).astype("<i4") % 5,
+        }
+        files.append(archive({f"{name}.npy": npy(array) for name, array in arrays.items()}))
+    return files
+
+
+_MAKERS = {
+    "obj": _obj,
+    "ply": _ply,
+    "stl": _stl,
+    "off": _off,
+    "glb": _glb,
+    "hdr": _hdr,
+    "exr": _exr,
+    "pfm": _pfm,
+    "npy": _npy,
+    "npz": _transfer,
+}
+FORMATS = tuple(_MAKERS)
+MESHES, PICTURES = FORMATS[:5], FORMATS[5:9]
+
+
+@functools.cache
+def seeds(kind: str) -> list[bytes]:
+    """Give the valid files of a format."""
+    return _MAKERS[kind]()

@@ -1,0 +1,102 @@
+"""What a reader may do with any bytes: read them, or refuse them in one sentence."""
+
+import resource
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+from fuzz_files import MESHES, PICTURES
+
+from jaxsh import geometry, imaging, transfer
+
+SECONDS = 2.0
+MEMORY = 200 << 20
+_PAGE = resource.getpagesize()
+
+
+class Fault(AssertionError):
+    """Says what a reader did that it may not."""
+
+
+def read(kind: str, path: Path):
+    """Read a file by the public function for its format."""
+    if kind in MESHES:
+        return geometry.read_mesh(path)
+    if kind in PICTURES:
+        return imaging.read_environment(path, repair=True)
+    return transfer.load(path)
+
+
+def check(kind: str, path: Path):
+    """Read a file and give what came, or None where it is refused; raise `Fault` for all else.
+
+    A refusal is a `ValueError` of one sentence with the file's name in it. A warning is a
+    `UserWarning` that names the file. Time is the process's own: a busy machine is no fault.
+    """
+    with warnings.catch_warnings(record=True) as met:
+        warnings.simplefilter("always")
+        started = time.process_time()
+        try:
+            result = read(kind, path)
+        except ValueError as error:
+            result = None
+            _check_words(str(error), path)
+            if type(error) is not ValueError:
+                raise Fault(f"refused by {type(error).__name__}: {error}") from error
+            if out_of_memory := _out_of_memory(error):
+                raise Fault(f"asked for too much memory: {error}") from out_of_memory
+        except BaseException as error:
+            raise Fault(f"{type(error).__name__}: {error}") from error
+        taken = time.process_time() - started
+    if taken > SECONDS:
+        raise Fault(f"took {taken:.1f} s")
+    for one in met:
+        if one.category is not UserWarning:
+            raise Fault(f"{one.category.__name__}: {one.message} ({one.filename}:{one.lineno})")
+        _check_words(str(one.message), path)
+    if result is not None:
+        _check_result(kind, result)
+    return None if met else result
+
+
+def _check_words(message: str, path: Path) -> None:
+    rest = message.replace(str(path), "", 1)
+    if rest == message:
+        raise Fault(f"does not name the file: {message}")
+    if len(rest) > 400 or not rest.isprintable():
+        raise Fault(f"is no sentence: {message[:1000]!r}")
+
+
+def _out_of_memory(error: BaseException | None) -> MemoryError | None:
+    while error is not None and not isinstance(error, MemoryError):
+        error = error.__cause__ or error.__context__
+    return error
+
+
+def _check_result(kind: str, result) -> None:
+    """Check that what came holds together by itself."""
+    if kind in MESHES:
+        faces, normals = np.asarray(result.faces), np.asarray(result.normals)
+        ok = np.isfinite(result.vertices).all() and len(faces) > 0
+        ok = ok and 0 <= faces.min() <= faces.max() < len(result.vertices)
+        ok = ok and np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 1e-3
+        for array in (result.uv, result.colors):
+            ok = ok and (array is None or bool(np.isfinite(array).all()))
+        chosen = result.face_material
+        ok = ok and (chosen is None or -1 <= chosen.min() <= chosen.max() < len(result.materials))
+    elif kind in PICTURES:
+        pixels = np.asarray(result)
+        ok = bool(np.isfinite(pixels).all()) and pixels.min() >= 0 and pixels.max() > 0
+    else:
+        neighbors = np.asarray(result.neighbors)
+        ok = neighbors.size == 0 or 0 <= neighbors.min() <= neighbors.max() < len(result.positions)
+    if not ok:
+        raise Fault(f"gave what does not hold together: {result}")
+
+
+def limit_memory(size: int) -> None:
+    """Let this process have ten times a file and 200 MB more than it has now."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    resource.setrlimit(resource.RLIMIT_AS, (pages * _PAGE + 10 * size + MEMORY, hard))

@@ -1,0 +1,59 @@
+"""A process of the fuzzer's own: it reads inputs one by one and says what came of each."""
+
+import faulthandler
+import os
+import resource
+import tempfile
+from pathlib import Path
+from random import Random
+
+from fuzz_changes import change
+from fuzz_files import seeds
+
+HANGS = 30.0  # seconds after which a process that is at one input is killed
+STARTING, READING, COMPARING, DONE = range(4)
+
+
+def made(kind: str, seed: int, index: int) -> bytes:
+    """Make one input."""
+    rng = Random(f"{seed} {kind} {index}")
+    return change(kind, rng.choice(seeds(kind)), rng)
+
+
+def work(kind, seed, indices, at, stage, found, peers) -> None:
+    """Put (index, fault or None, input or outcome) into `found`, an outcome for each input."""
+    import fuzz_peers
+    from fuzz_readers import Fault, check, limit_memory
+
+    if not os.environ.get("FUZZ_STDERR"):  # libraries talk there about damaged files
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    limit = resource.getrlimit(resource.RLIMIT_AS)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"input.{kind}"
+        path.write_bytes(seeds(kind)[0])
+        check(kind, path)  # what is loaded or compiled once counts against no input
+        for index in indices:
+            data = made(kind, seed, index)
+            path.write_bytes(data)
+            at.value, stage.value = index, READING
+            faulthandler.dump_traceback_later(HANGS, exit=True)
+            before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            limit_memory(len(data))
+            try:
+                result = check(kind, path)
+                outcome = "refused or warned of" if result is None else "read"
+            except Fault as fault:
+                result, outcome = None, "at fault"
+                found.put((index, str(fault), data))
+            finally:
+                resource.setrlimit(resource.RLIMIT_AS, limit)
+            grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) << 10
+            if grown > 10 * len(data) + (200 << 20):
+                found.put((index, f"took {grown >> 20} MB", data))
+            if peers and result is not None:
+                stage.value = COMPARING
+                if said := fuzz_peers.disagreement(kind, path, fuzz_peers.summary(kind, result)):
+                    found.put((index, said, data))
+            faulthandler.cancel_dump_traceback_later()
+            found.put((index, None, outcome))
+    stage.value = DONE
