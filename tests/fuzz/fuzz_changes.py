@@ -212,6 +212,11 @@ _EXTENSION = {
 }
 
 
+def _copied(tree):
+    """Copy a tree of JSON, so that no change reaches another place, or a later input."""
+    return json.loads(json.dumps(tree))
+
+
 def _inside(tree: object) -> list[tuple]:
     """List each (container, key) of a tree of JSON."""
     places, todo = [], [tree]
@@ -234,21 +239,20 @@ def _edit_tree(tree, rng: Random) -> None:
     value = where[key]
     match rng.randrange(9):
         case 0 | 1 | 2:
-            where[key] = json.loads(json.dumps(rng.choice(JSON_VALUES)))
+            where[key] = _copied(rng.choice(JSON_VALUES))
         case 3 if isinstance(value, int | float) and not isinstance(value, bool):
             where[key] = value + rng.choice([-2, -1, 1, 2, 4, 0.5, 1000])
         case 4:
             del where[key]
         case 5:
-            new = json.loads(json.dumps(rng.choice(places)[0]))
-            where[key] = new
+            where[key] = _copied(rng.choice(places)[0])
         case 6 if isinstance(where, list):
-            where.append(json.loads(json.dumps(value)))
+            where.append(_copied(value))
         case 7 if isinstance(where, dict):
-            where[rng.choice(JSON_KEYS)] = json.loads(json.dumps(rng.choice(JSON_VALUES)))
+            where[rng.choice(JSON_KEYS)] = _copied(rng.choice(JSON_VALUES))
         case 8 if isinstance(where, dict):
             name = rng.choice(_EXTENSIONS)
-            where["extensions"] = {name: _EXTENSION | {"bufferView": rng.randrange(4)}}
+            where["extensions"] = {name: _copied(_EXTENSION) | {"bufferView": rng.randrange(4)}}
             if rng.random() < 0.5:
                 tree["extensionsRequired"] = [name]
 

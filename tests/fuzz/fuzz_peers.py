@@ -31,6 +31,8 @@ def summary(kind: str, result) -> Summary | None:
     """Sum up what our reader gave."""
     if kind in MESHES:
         vertices = np.asarray(result.vertices, np.float64) + np.array(result.origin)
+        if kind == "glb":  # in the file's axes
+            vertices = vertices[:, [0, 2, 1]] * [1, 1, -1]
         return of_triangles(vertices[np.asarray(result.faces)])
     if kind in PICTURES:
         return np.asarray(result, np.float64).mean(axis=(0, 1))

@@ -23,12 +23,14 @@ def made(kind: str, seed: int, index: int) -> bytes:
 def work(kind, seed, indices, at, stage, found, peers) -> None:
     """Put (index, fault or None, input or outcome) into `found`, an outcome for each input."""
     import fuzz_peers
-    from fuzz_readers import Fault, check, limit_memory
+    from fuzz_readers import Fault, check, limit_memory, without_compiling
 
+    without_compiling()
     if not os.environ.get("FUZZ_STDERR"):  # libraries talk there about damaged files
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     limit = resource.getrlimit(resource.RLIMIT_AS)
-    with tempfile.TemporaryDirectory() as folder:
+    memory = "/dev/shm"  # where files are in memory, on Linux
+    with tempfile.TemporaryDirectory(dir=memory if os.path.isdir(memory) else None) as folder:
         path = Path(folder) / f"input.{kind}"
         path.write_bytes(seeds(kind)[0])
         check(kind, path)  # what is loaded or compiled once counts against no input
