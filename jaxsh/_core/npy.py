@@ -3,10 +3,39 @@
 import io
 import math
 import warnings
+from typing import NamedTuple
 
 import numpy as np
 
 from .words import reason
+
+
+class NpyHeader(NamedTuple):
+    """Holds what the header of a .npy file says, and where its numbers start."""
+
+    shape: tuple[int, ...]
+    by_columns: bool
+    dtype: np.dtype
+    place: int
+
+
+def npy_header(data: bytes) -> NpyHeader:
+    """Read the header of a .npy file; raises `ValueError` for a damaged one."""
+    stream = io.BytesIO(data)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of headers that Python 2 wrote
+            version = np.lib.format.read_magic(stream)
+            if version == (1, 0):
+                shape, by_columns, dtype = np.lib.format.read_array_header_1_0(stream)
+            else:
+                shape, by_columns, dtype = np.lib.format.read_array_header_2_0(stream)
+    except Exception as error:  # the header is Python text, and its parser may raise anything
+        raise ValueError(f"damaged or not a .npy file: {reason(error)}") from error
+    # True and -1 are whole numbers in Python text.
+    if any(type(n) is not int or n < 0 for n in shape):
+        raise ValueError(f"damaged: its shape is {reason(str(shape))}")
+    return NpyHeader(shape, by_columns, dtype, stream.tell())
 
 
 def from_npy(data: bytes) -> np.ndarray:
@@ -15,26 +44,15 @@ def from_npy(data: bytes) -> np.ndarray:
     Raises `ValueError` for a damaged header, for objects, and where the numbers are not as many as
     the shape says: NumPy itself asks for the memory first, and ignores what follows.
     """
-    stream = io.BytesIO(data)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of headers that Python 2 wrote
-            version = np.lib.format.read_magic(stream)
-            read = {
-                (1, 0): np.lib.format.read_array_header_1_0,
-                (2, 0): np.lib.format.read_array_header_2_0,
-            }
-            if version not in read:
-                raise ValueError(f"version {version[0]}.{version[1]} is not read")
-            shape, by_columns, dtype = read[version](stream)
-    except Exception as error:  # the header is Python text, and its parser may raise anything
-        raise ValueError(f"damaged or not a .npy file: {reason(error)}") from error
-    if dtype.hasobject:
+    header = npy_header(data)
+    if header.dtype.hasobject:
         raise ValueError("it holds Python objects, not numbers")
-    body = memoryview(data)[stream.tell() :]
-    size = math.prod(shape) * dtype.itemsize
-    # A header is Python text: True and -1 are numbers there.
-    if any(type(n) is not int or n < 0 for n in shape) or len(body) != size:
-        raise ValueError(f"damaged: shape {shape} takes {size} bytes, but {len(body)} are there")
-    numbers = np.frombuffer(body, dtype) if size else np.empty(math.prod(shape), dtype)
-    return numbers.reshape(shape, order="F" if by_columns else "C")
+    count, body = math.prod(header.shape), memoryview(data)[header.place :]
+    size = count * header.dtype.itemsize
+    if len(body) != size:
+        raise ValueError(
+            f"damaged: shape {reason(str(header.shape))} takes {size} bytes, but {len(body)} are "
+            "there"
+        )
+    numbers = np.frombuffer(body, header.dtype) if size else np.empty(count, header.dtype)
+    return numbers.reshape(header.shape, order="F" if header.by_columns else "C")

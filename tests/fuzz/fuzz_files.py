@@ -127,12 +127,21 @@ def glb(content: dict, body: bytes) -> bytes:
     return head + text + struct.pack("<I4s", len(body), b"BIN\0") + body
 
 
+def _outward(points: np.ndarray) -> np.ndarray:
+    """Give a unit normal for each point, on the same side as all its faces."""
+    corners = points[TRIANGLES]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = np.zeros_like(points)
+    np.add.at(sums, TRIANGLES, (normals / np.linalg.norm(normals, axis=1, keepdims=True))[:, None])
+    return sums / np.linalg.norm(sums, axis=1, keepdims=True)
+
+
 def _glb() -> list[bytes]:
     turned = POINTS[:, [0, 2, 1]] * [1, 1, -1]
     parts = [
         turned.astype("<f4").tobytes(),
         TRIANGLES.astype("<u2").tobytes(),
-        np.tile(np.array([0.6, 0.8, 0]), (12, 1)).astype("<f4").tobytes(),
+        _outward(turned).astype("<f4").tobytes(),
         _UV.astype("<f4").tobytes(),
         _COLORS.astype("u1").tobytes(),
         np.array([3], "<u2").tobytes(),
@@ -188,8 +197,13 @@ def _glb() -> list[bytes]:
         "values": {"bufferView": 6},
     }
     lifted = {**content, "accessors": [{**accessors[0], "sparse": sparse}, accessors[1]]}
-    strip = {"attributes": {"POSITION": 0}, "mode": 5}
-    strips = {**content, "meshes": [{"primitives": [strip, {**strip, "mode": 6}]}]}
+    modes = [{"attributes": {"POSITION": 0}, "mode": mode} for mode in (5, 6)]
+    strips = {
+        **content,
+        "scenes": [{"nodes": [0, 1]}],
+        "nodes": [{"mesh": 0}, {"mesh": 1, "translation": [9, 0, 0]}],
+        "meshes": [{"primitives": [one]} for one in modes],
+    }
     return [glb(one, body) for one in (content, full, lifted, strips)]
 
 

@@ -4,7 +4,9 @@ import resource
 import time
 import warnings
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 from fuzz_files import MESHES, PICTURES
 
@@ -32,7 +34,8 @@ def numpy_normals(vertices, faces):
     sums = np.zeros(np.shape(vertices))
     np.add.at(sums, faces, angle * across / np.where(twice_area > 0, twice_area, 1))
     length = np.linalg.norm(sums, axis=1, keepdims=True)
-    return np.where(length > 0, sums / np.where(length > 0, length, 1), [0, 0, 1.0]).astype("f4")
+    unit = np.where(length > 0, sums / np.where(length > 0, length, 1), [0, 0, 1.0])
+    return jnp.asarray(unit.astype(np.float32))
 
 
 def without_compiling():
@@ -50,8 +53,15 @@ def read(kind: str, path: Path):
     return transfer.load(path)
 
 
-def check(kind: str, path: Path):
-    """Read a file and give what came, or None where it is refused; raise `Fault` for all else.
+class Outcome(NamedTuple):
+    """Holds what a reader gave, None where it refused the file, and whether it warned."""
+
+    result: Any
+    warned: bool
+
+
+def check(kind: str, path: Path) -> Outcome:
+    """Read a file; raise `Fault` where that ends in anything but a result or a refusal.
 
     A refusal is a `ValueError` of one sentence with the file's name in it. A warning is a
     `UserWarning` that names the file. Time is the process's own: a busy machine is no fault.
@@ -79,7 +89,7 @@ def check(kind: str, path: Path):
         _check_words(str(one.message), path)
     if result is not None:
         _check_result(kind, result)
-    return None if met else result
+    return Outcome(result, bool(met))
 
 
 def _check_words(message: str, path: Path) -> None:

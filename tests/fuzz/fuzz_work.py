@@ -42,17 +42,19 @@ def work(kind, seed, indices, at, stage, found, peers) -> None:
             before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
             limit_memory(len(data))
             try:
-                result = check(kind, path)
-                outcome = "refused or warned of" if result is None else "read"
+                result, warned = check(kind, path)
+                outcome = (
+                    "refused" if result is None else "read, and warned of" if warned else "read"
+                )
             except Fault as fault:
-                result, outcome = None, "at fault"
+                result, warned, outcome = None, True, "at fault"
                 found.put((index, str(fault), data))
             finally:
                 resource.setrlimit(resource.RLIMIT_AS, limit)
             grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) << 10
             if grown > 10 * len(data) + (200 << 20):
                 found.put((index, f"took {grown >> 20} MB", data))
-            if peers and result is not None:
+            if peers and result is not None and not warned:
                 stage.value = COMPARING
                 if said := fuzz_peers.disagreement(kind, path, fuzz_peers.summary(kind, result)):
                     found.put((index, said, data))

@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 from jaxtyping import UInt8
 
+from ..._core.words import reason
 from ._gltf_accessors import view_bytes
 from ._gltf_container import Document
 from ._gltf_json import Fields, extension, text, whole
@@ -85,8 +86,7 @@ class Pictures:
             kind = "KTX2" if data[1:7] == b"KTX 20" else "neither PNG, JPEG nor WebP"
             raise ValueError(f"{owner} cannot be decoded: it is {kind}") from None
         except Exception as error:  # decoders may raise anything where a picture is damaged
-            reason = str(error).strip().split("\n")[0]
-            raise ValueError(f"{owner} cannot be decoded: {reason}") from None
+            raise ValueError(f"{owner} cannot be decoded: {reason(error)}") from None
 
     def _check_size(self, size: tuple[int, int], stored: int) -> None:
         # A byte seldom gives more than ten pixels; more are for plain pictures of moderate size.

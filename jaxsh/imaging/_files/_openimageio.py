@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Shaped
 
+from ..._core.words import reason
 from ._channels import Choice, choose
 from ._color import REC709, converted, decoded, from_luminance_chroma, luminance_weights, to_rec709
 from ._turn import order_of_exif, upright
@@ -101,7 +102,7 @@ def _open(path: Path) -> Any:
     hint.attribute("oiio:UnassociatedAlpha", 1)  # colors as they are held
     source = oiio.ImageInput.open(str(path), hint)
     if source is None:
-        problem = _first_line(oiio.geterror())
+        problem = reason(oiio.geterror())
         if "ubsampled channels" in problem:
             raise ValueError(
                 "its chroma has fewer pixels than its luminance, which is not read: save it as "
@@ -146,14 +147,10 @@ def _read(
 ) -> Shaped[np.ndarray, "h w c"]:
     """Decode some channels. OpenImageIO may stop halfway and report it later."""
     pixels = source.read_image(part, 0, first, last, kind)
-    problem = _first_line(source.geterror())
+    problem = reason(source.geterror())
     if pixels is None or problem:
         raise ValueError(f"damaged or truncated: {problem or 'no pixels'}")
     return pixels
-
-
-def _first_line(text: str) -> str:
-    return text.strip().split("\n")[0]
 
 
 def _check_size(spec: Any, path: Path) -> None:

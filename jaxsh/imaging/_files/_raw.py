@@ -1,11 +1,12 @@
 """File formats that are numbers behind a header: .pfm and .npy."""
 
-import io
 import math
 import re
 
 import numpy as np
 from jaxtyping import Float, Shaped
+
+from ..._core.npy import npy_header
 
 # Width, height and scale in text, then one newline and the floats.
 _GAP = rb"(?:\s|#[^\n]*\n)+"  # comments are not in the format, and are in files
@@ -38,23 +39,14 @@ def read_pfm(data: bytes) -> Float[np.ndarray, "h w c"]:
 
 def read_npy(data: bytes) -> Shaped[np.ndarray, "h w c"]:
     """Read a NumPy file of float16, 32 or 64, uint8 or uint16, with shape (h, w, 3) or (h, w)."""
-    stream = io.BytesIO(data)
-    try:
-        version = np.lib.format.read_magic(stream)
-        if version == (1, 0):
-            shape, by_columns, dtype = np.lib.format.read_array_header_1_0(stream)
-        else:
-            shape, by_columns, dtype = np.lib.format.read_array_header_2_0(stream)
-    except Exception as error:  # the header is Python text, and its parser may raise anything
-        reason = str(error).strip().split("\n")[0]
-        raise ValueError(f"damaged or not a .npy file: {reason}") from error
+    shape, by_columns, dtype, place = npy_header(data)
     if dtype.itemsize > {"f": 8, "u": 2}.get(dtype.kind, 0):
         raise ValueError(f"needs float16, float32, float64, uint8 or uint16, got {dtype}")
     if len(shape) not in (2, 3) or (len(shape) == 3 and shape[2] not in (1, 3)):
         first = len(shape) == 3 and shape[0] in (1, 3)
         hint = ": channels come last, see numpy.moveaxis" if first else ""
         raise ValueError(f"needs shape (h, w, 3) or (h, w), got {shape}{hint}")
-    numbers = _numbers(data[stream.tell() :], dtype, shape)
+    numbers = _numbers(data[place:], dtype, shape)
     pixels = numbers.reshape(shape, order="F" if by_columns else "C")
     return pixels if len(shape) == 3 else pixels[..., None]
 
