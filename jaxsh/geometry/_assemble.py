@@ -155,10 +155,12 @@ def _uv(uv: np.ndarray) -> np.ndarray:
 def _linear(colors: np.ndarray, encoding: str) -> np.ndarray:
     """Decode RGBA (f, 3, 4), white where the file leaves it out."""
     colors = np.where(np.isfinite(colors), colors, 1.0)
-    rgb = np.maximum(colors[..., :3], 0)
+    # No picture has such colors, and float32 would not hold their powers.
+    colors = np.clip(colors, 0, 1e9)
+    rgb = colors[..., :3]
     if encoding == "srgb":
         rgb = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    return np.concatenate([rgb, colors[..., 3:]], axis=2).astype(np.float32) + np.float32(0)
+    return np.concatenate([rgb, colors[..., 3:]], axis=2).astype(np.float32)
 
 
 def _origin(positions: np.ndarray, faces: np.ndarray) -> tuple[Origin, list[str]]:

@@ -1,38 +1,28 @@
-"""Mesh files: parsed by trimesh, and checked against the counts that they announce."""
+"""Mesh files, each format by its parser, as one `Mesh`."""
 
-import io
 import os
-import re
-import warnings
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from ._assemble import Origin, assemble, check_options
 from ._files._gltf import read_gltf
+from ._files._obj import read_obj
+from ._files._off import read_off
+from ._files._ply import read_ply
 from ._files._polygons import Polygons
+from ._files._stl import read_stl
 from ._mesh import Mesh
 
-# What trimesh need not look at. Textures would make it split and reorder vertices.
-_OPTIONS: dict[str, dict[str, Any]] = {
-    ".ply": {"fix_texture": False, "skip_materials": True},
-    ".obj": {"maintain_order": True, "skip_materials": True},
+_PARSERS = {
+    ".ply": read_ply,
+    ".obj": read_obj,
+    ".off": read_off,
+    ".stl": read_stl,
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
 }
-
-
-# Every statement of the format (Wavefront's appendix B1): a damaged "f" must not pass for another.
-_OBJ_STATEMENTS = re.compile(
-    "v|vt|vn|vp|deg|bmat|step|cstype|p|l|f|curv|curv2|surf|parm|trim|hole|scrv|sp|end|con|g|s|mg|o|"
-    "bevel|c_interp|d_interp|lod|usemap|maplib|usemtl|mtllib|shadow_obj|trace_obj|ctech|stech|"
-    "bsp|bzp|cdc|cdp|res|call|csh"
-)
-# One facet of a text STL: a number too many here and one too few there would shift all between.
-_STL_NUMBER = rb"\s+(?:[-+.\de]+|[-+]?nan|[-+]?inf)"
-_STL_FACET = re.compile(
-    rb"facet\s+normal(?:%(n)s){3}\s+outer\s+loop(?:\s+vertex(?:%(n)s){3}){3}\s+endloop\s+endfacet\s"
-    % {b"n": _STL_NUMBER}
-)
 
 
 def read_mesh(
@@ -101,8 +91,7 @@ def read_mesh(
         polygons = _PARSERS[suffix](path, data)
         _check(polygons)
     except Exception as error:  # a parser may raise anything when a file is damaged
-        # trimesh looks for this package, which it does not require, in text that is not UTF-8.
-        if isinstance(error, ImportError) and error.name != "charset_normalizer":
+        if isinstance(error, ImportError | MemoryError):
             raise
         reason = str(error).strip().split("\n")[0]
         raise ValueError(f"{path}: damaged or not a {suffix} file: {reason}") from error
@@ -142,132 +131,3 @@ def _turned(polygons: Polygons) -> Polygons:
 
     normals = None if polygons.normals is None else turn(polygons.normals)
     return polygons._replace(positions=turn(polygons.positions), normals=normals)
-
-
-def _by_trimesh(path: Path, data: bytes) -> Polygons:
-    suffix = path.suffix.lower()
-    if suffix == ".obj":
-        data = _plain_obj(data)
-    announced = _announced(data, suffix)
-    vertices, faces = _parse(data, suffix)
-    # Each polygon gives at least one triangle.
-    if announced and (len(vertices) != announced[0] or len(faces) < announced[1]):
-        raise ValueError(
-            f"it announces {announced[0]} vertices and {announced[1]} faces, "
-            f"but {len(vertices)} vertices and {len(faces)} triangles could be read"
-        )
-    faces = np.asarray(faces, np.int64)
-    return Polygons(np.asarray(vertices, np.float64), faces.ravel(), np.full(len(faces), 3))
-
-
-_PARSERS = {
-    **dict.fromkeys((".ply", ".obj", ".off", ".stl"), _by_trimesh),
-    ".glb": read_gltf,
-    ".gltf": read_gltf,
-}
-
-
-def _parse(data: bytes, suffix: str) -> tuple[np.ndarray, np.ndarray]:
-    try:
-        import trimesh
-    except ImportError as error:
-        raise ImportError(
-            "reading mesh files needs the package trimesh, which cannot be imported here; "
-            "make_mesh takes arrays without it"
-        ) from error
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        # NumPy only warns when text stops making sense, and gives what it had read so far.
-        warnings.filterwarnings("error", message=".*could not be read to its end")
-        loaded = trimesh.load(
-            io.BytesIO(data), file_type=suffix[1:], process=False, **_OPTIONS.get(suffix, {})
-        )
-        parts = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
-    meshes = [part for part in parts if isinstance(part, trimesh.Trimesh)]
-    if not meshes:
-        raise ValueError("it holds no faces")
-    offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
-    faces = [np.asarray(mesh.faces) + offset for mesh, offset in zip(meshes, offsets, strict=False)]
-    return np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces)
-
-
-def _plain_obj(data: bytes) -> bytes:
-    """Keep positions and faces, absolutely indexed: trimesh splits vertices at texture seams."""
-    text = data.decode("utf-8", errors="replace").replace("\\\n", " ").replace("\\\r\n", " ")
-    lines, count = [], 0
-    for number, line in enumerate(text.splitlines(), start=1):
-        key, *words = line.split("#")[0].split() or [""]
-        if key and not _OBJ_STATEMENTS.fullmatch(key):
-            raise ValueError(f"line {number} begins with {key!r}, which is no statement")
-        if key not in ("v", "f"):
-            continue
-        if len(words) < 3:
-            raise ValueError(f"line {number} has {len(words)} values after {key!r}")
-        if key == "v":
-            count += 1
-            words = words[:3]
-        else:
-            indices = [int(word.split("/")[0]) for word in words]
-            # Negative ones count back from the last vertex so far.
-            indices = [i + count + 1 if i < 0 else i for i in indices]
-            if min(indices) < 1:
-                raise ValueError(f"line {number} names vertex {words[indices.index(min(indices))]}")
-            words = map(str, indices)
-        lines.append(" ".join([key, *words]))
-    return "\n".join(lines).encode()
-
-
-def _announced(data: bytes, suffix: str) -> tuple[int, int] | None:
-    """Read the numbers of vertices and faces that a file announces: parsers accept fewer.
-
-    None for glTF, whose parser checks the length of every chunk. Raises `ValueError` where the
-    file is plainly too short.
-    """
-    if not data.strip():
-        raise ValueError("it is empty")
-    match suffix:
-        case ".obj":
-            return len(re.findall(rb"^v ", data, re.M)), len(re.findall(rb"^f ", data, re.M))
-        case ".stl":
-            facets = int.from_bytes(data[80:84], "little")
-            if len(data) != 84 + 50 * facets:  # not binary
-                facets = _text_facets(data.lower())
-            return 3 * facets, facets
-        case ".off":
-            lines = [line.split(b"#")[0].split() for line in data.splitlines()]
-            lines = [[word for word in line if not word.endswith(b"OFF")] for line in lines]
-            lines = [line for line in lines if line]
-            vertices, faces = map(int, lines[0][:2])
-            _check_lines(len(lines), vertices + faces + 1)
-            return vertices, faces
-        case ".ply":
-            header, end, body = data.partition(b"end_header")
-            elements = dict(re.findall(rb"element\s+(\w+)\s+(\d+)", header))
-            if not end or b"vertex" not in elements:
-                raise ValueError("its header is not whole")
-            if re.search(rb"format\s+ascii", header):
-                _check_lines(
-                    sum(map(bool, map(bytes.split, body.splitlines()))),
-                    sum(map(int, elements.values())),
-                )
-            return int(elements[b"vertex"]), int(elements.get(b"face", 0))
-    return None
-
-
-def _text_facets(data: bytes) -> int:
-    """Count the facets of a text STL, in lower case, if it holds nothing else."""
-    rest, facets = _STL_FACET.subn(b"", re.sub(rb"(?m)^[ \t]*(?:end)?solid\b.*$", b"", data))
-    if b"facet" not in data:
-        raise ValueError("it is neither text nor as long as its number of facets")
-    if b"endsolid" not in data:
-        raise ValueError("it breaks off before endsolid")
-    if rest.strip():
-        odd = rest.strip().splitlines()[0][:60].decode(errors="replace")
-        raise ValueError(f"its facets are damaged, first at {odd!r}")
-    return facets
-
-
-def _check_lines(found: int, announced: int) -> None:
-    if found < announced:
-        raise ValueError(f"it announces {announced} lines of data, but has {found}")

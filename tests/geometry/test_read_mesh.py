@@ -67,13 +67,25 @@ def test_obj_with_seams_polygons_groups_and_relative_indices(tmp_path):
         "v 0 1 0 1 0 0\nvt 0 0\nvt 1 1\nvn 0 0 1\nvn 1 0 0\nusemtl a\n"
         "f 1/1/1 2/2/1 3/1/2 4/2/2\no two\nusemtl b\nv 0 0 1\nf 1//1 \\\n 2//1 -1//2 # end\n"
     )
-    mesh = read_mesh(path)
-    # Vertices in the file's order, not split where texture or normals differ.
-    np.testing.assert_array_equal(
-        mesh.vertices, [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1]]
+    with pytest.warns(UserWarning, match="missing") as record:
+        mesh = read_mesh(path)
+    assert str(record[0].message) == (
+        f"{path}: the materials 'missing.mtl' are not there, materials a, b are white, being in no "
+        "file"
     )
-    faces = {tuple(np.roll(f, -np.argmin(f))) for f in np.asarray(mesh.faces)}
-    assert faces == {(0, 1, 2), (0, 2, 3), (0, 1, 4)}
+    corners = np.asarray(mesh.vertices)[mesh.faces]
+    np.testing.assert_array_equal(corners[:, 0], [[0, 0, 0]] * 3)
+    np.testing.assert_array_equal(corners[:, 1], [[1, 0, 0], [1, 1, 0], [1, 0, 0]])
+    np.testing.assert_array_equal(corners[:, 2], [[1, 1, 0], [0, 1, 0], [0, 0, 1]])
+    normals, uv = np.asarray(mesh.normals)[mesh.faces], np.asarray(mesh.uv)[mesh.faces]
+    z, x = [0, 0, 1], [1, 0, 0]
+    np.testing.assert_array_equal(normals, [[z, z, x], [z, x, x], [z, z, x]])
+    np.testing.assert_array_equal(uv[..., 0], [[0, 1, 0], [0, 0, 1], [0, 0, 0]])
+    np.testing.assert_array_equal(mesh.colors[:4], [[1, 0, 0, 1]] * 4)
+    np.testing.assert_array_equal(mesh.face_material, [0, 0, 1])
+    assert [material.name for material in mesh.materials] == ["a", "b"]
+    # Two corners of one position, normal and UV are one vertex; in the order of the lines "v".
+    assert len(mesh.vertices) == 6
 
 
 def test_scene_parts_stand_where_the_scene_puts_them(tmp_path):
@@ -131,7 +143,7 @@ def test_unknown_up(unchecked, tmp_path):
     [
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "it holds no faces"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n", "line 4 has 2 values after 'f'"),
-        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n", "line 4 names vertex -4"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n", "line 4 names v -4, but there are 3"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "damaged"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nF 3 2 1\n", "line 5 begins with 'F'"),
         ("a.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "announces 6 lines .* has 5"),
@@ -178,7 +190,9 @@ def test_numbers_that_shift_in_a_text_stl(tmp_path):
             words[:-1] if change == "append" else [words[0], *words[2:]]
         )
         path.write_text("\n".join(shifted))
-        with pytest.raises(ValueError, match=r"shift\.stl: .*facets are damaged, first at 'facet"):
+        with pytest.raises(
+            ValueError, match=r"shift\.stl: .*facets are damaged, first that of line 2"
+        ):
             read_mesh(path)
 
 

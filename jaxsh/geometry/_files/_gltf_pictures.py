@@ -81,7 +81,7 @@ class Pictures:
                 image = Image.open(io.BytesIO(data), formats=_FORMATS)
                 self._check_size(image.size, len(data))
                 image.load()
-                return _as_rgba(image)
+                return as_rgba(image)
         except UnidentifiedImageError:
             kind = "KTX2" if data[1:7] == b"KTX 20" else "neither PNG, JPEG nor WebP"
             raise ValueError(f"{owner} cannot be decoded: it is {kind}") from None
@@ -97,7 +97,7 @@ class Pictures:
             )
 
 
-def _as_rgba(image) -> UInt8[np.ndarray, "h w 4"]:
+def as_rgba(image) -> UInt8[np.ndarray, "h w 4"]:
     """Convert to 8-bit RGBA, some rows at a time to need little memory."""
     width, height = image.size
     pixels = np.empty((height, width, 4), np.uint8)
