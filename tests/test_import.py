@@ -75,7 +75,8 @@ def test_modules_are_listed_and_others_refused():
 
 
 # As on a machine without a wheel, or where someone left out what they do not use.
-OPTIONAL = ("OpenImageIO", "embreex", "jaxopt", "lineax", "matplotlib", "optimistix", "trimesh")
+OPTIONAL = ("OpenImageIO", "embreex", "jaxopt", "lineax", "matplotlib", "optimistix")
+OPTIONAL += ("PIL", "mapbox_earcut", "trimesh")
 BLOCK = """
 import sys
 
@@ -109,12 +110,15 @@ def test_the_basis_and_a_bake_run_without_optional_packages():
     [
         ("OpenImageIO", "imaging.read_environment('grace.exr')"),
         ("matplotlib", "plot.bands([1.0])"),
-        ("trimesh", "geometry.read_mesh('armadillo.off')"),
+        ("mapbox_earcut", "geometry.read_mesh('plus.off')"),
     ],
 )
 def test_what_needs_a_package_says_so_without_it(package, statement, tmp_path):
     (tmp_path / "grace.exr").write_bytes(b"")
-    (tmp_path / "armadillo.off").write_text("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    plus = "10 20 21 31 32 22 23 13 12 02 01 11"
+    corners = [f"{x} {y} 0" for x, y in plus.split(" ")]
+    lines = ["OFF 12 1 0", *corners, " ".join(map(str, (12, *range(12))))]
+    (tmp_path / "plus.off").write_text("\n".join(lines))
     code = BLOCK.format(optional={package}) + (
         f"from jaxsh import geometry, imaging, plot\n{statement}"
     )

@@ -187,7 +187,8 @@ def _materials(
     numbers = face.get("texnumber")
     if isinstance(numbers, np.ndarray):
         used.add("texnumber")
-        rows[: len(numbers)] = _whole(numbers)
+        numbers = _whole(numbers)[:count]
+        rows[: len(numbers)] = numbers
     return materials, np.where((rows >= 0) & (rows < len(names)), rows, -1)
 
 
