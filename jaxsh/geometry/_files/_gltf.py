@@ -141,37 +141,39 @@ def _cofactors(
 
 def _joined(parts: list[Part], materials: Materials, found: tuple[str, ...]) -> Polygons:
     """Put all parts in a row, and what their vertices carry at each corner."""
-    offsets = np.cumsum([0, *(len(part.positions) for part in parts)])[:-1]
-    faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=True)]
-    count = sum(map(len, faces))
+    starts = np.cumsum([0, *(len(part.positions) for part in parts)])
+    ends = np.cumsum([0, *(part.faces.size for part in parts)])
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
 
-    def joined(name: str, width: int):
-        rows = [getattr(part, name) for part in parts]
+    def joined(rows: list[np.ndarray | None], width: int) -> np.ndarray | None:
         if all(row is None for row in rows):
             return None
-        return np.concatenate(
-            [
-                np.full((part.faces.size, width), np.nan)
-                if row is None
-                else row[part.faces.ravel()]
-                for row, part in zip(rows, parts, strict=True)
-            ]
-        )
+        out = np.full((ends[-1], width), np.nan)
+        for row, part, start in zip(rows, parts, ends, strict=False):
+            if row is not None:
+                place = out[start : start + part.faces.size]
+                # No vertex is out of range: "clip" only spares a copy.
+                np.take(row, part.faces.ravel(), axis=0, out=place, mode="clip")
+        return out
 
-    normals = joined("normals", 3)
-    if normals is not None:
-        # First by the largest component: squares of very long or short ones leave the range.
-        normals /= np.abs(normals).max(axis=1, keepdims=True, initial=0)
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    rows = np.repeat([part.material for part in parts], [len(face) for face in faces])
+    rows = np.repeat([part.material for part in parts], [len(part.faces) for part in parts])
     return Polygons(
         np.concatenate([part.positions for part in parts]),
         np.concatenate([face.ravel() for face in faces]),
-        np.full(count, 3),
-        normals,
-        joined("uv", 2),
-        joined("colors", 4),
-        rows.astype(np.int64) if materials.table else None,
+        np.full(ends[-1] // 3, 3),
+        joined([_unit(part.normals) for part in parts], 3),
+        joined([part.uv for part in parts], 2),
+        joined([part.colors for part in parts], 4),
+        rows if materials.table else None,
         materials.table,
         found,
     )
+
+
+def _unit(normals: Float[np.ndarray, "n 3"] | None) -> Float[np.ndarray, "n 3"] | None:
+    """Give normals the length 1, NaN where they have no direction."""
+    if normals is None:
+        return None
+    # First by the largest component: squares of very long or short ones leave the range.
+    scaled = normals / np.abs(normals).max(axis=1, keepdims=True, initial=0)
+    return scaled / np.linalg.norm(scaled, axis=1, keepdims=True)

@@ -85,8 +85,8 @@ class Document:
     def spend(self, corners: int) -> None:
         """Raise `ValueError` where the corners asked for so far are out of proportion."""
         self._spent += corners
-        # 700,000 triangles of a small file, by instances or by index strips, are plausible.
-        most = 2**21 + 4 * self.size
+        # 350,000 triangles of a small file, by instances or by index strips, are plausible.
+        most = 2**20 + 4 * self.size
         if self._spent > most:
             raise ValueError(
                 f"its instances and primitives give {shown(self._spent)} corners or more, out of "
