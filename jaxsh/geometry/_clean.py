@@ -93,8 +93,8 @@ def check_arrays(vertices: np.ndarray, faces: np.ndarray) -> None:
 
 
 def first_of_equals(rows: np.ndarray) -> np.ndarray:
-    """Give for each row of a float32 array the index of the first one with the same bits."""
-    bits = np.ascontiguousarray(rows, np.float32).view(np.uint32)
+    """Give for each row of floats the index of the first one with the same bits."""
+    bits = np.ascontiguousarray(rows).view(np.uint32)
     # Rows that are equal have one hash, and are found by sorting that alone.
     key = np.zeros(len(bits), np.uint64)
     for column in bits.T:

@@ -22,8 +22,8 @@ def split(
     Corners become one vertex where they agree in `faces` (the position), `knots` (the normal) and
     in all `attributes`. Vertices stand in the order of their `source` row, as in the file.
     """
-    names = np.stack([faces.ravel(), knots.ravel()], axis=1).astype(np.int32).view(np.float32)
-    columns = [a.reshape(faces.size, -1).astype(np.float32) for a in attributes]
+    names = np.stack([faces.ravel(), knots.ravel()], axis=1).astype(np.int32)
+    columns = [a.reshape(faces.size, -1).astype(np.float32).view(np.int32) for a in attributes]
     first = first_of_equals(np.concatenate([names, *columns], axis=1))
     corner = np.flatnonzero(first == np.arange(len(first)))
     earliest = np.full(faces.size, np.iinfo(np.int64).max)

@@ -6,6 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int
 
+from ._clean import first_of_equals
+from ._files._text import ranges
 from ._mesh import Mesh
 
 
@@ -25,7 +27,7 @@ class Topology(NamedTuple):
     (True, True, 1, 0)
     """
 
-    vertices: int  # those in a face
+    vertices: int  # those in a face; several at one position are one
     edges: int
     faces: int
     components: int  # pieces that share no vertex
@@ -78,6 +80,7 @@ class Topology(NamedTuple):
 def topology(mesh: Mesh) -> Topology:
     """Count the boundary, the pieces and the faults of a mesh.
 
+    Vertices at exactly the same position, as at hard edges and UV seams, count as one.
     Nothing else in `geometry` looks: an open mesh is as good as a closed one to cast rays at, and
     a non-manifold one has normals and neighbors too. Faces that name a vertex twice are left
     out. Runs on the host, outside `jit`: the answer is Python numbers. Not differentiable.
@@ -91,6 +94,7 @@ def topology(mesh: Mesh) -> Topology:
     (False, 3, 1)
     """
     faces = np.asarray(mesh.faces, np.int64)
+    faces = _joined(mesh, faces)[faces]
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     corner = np.arange(faces.size)  # which also names the half-edge that leaves it
@@ -138,7 +142,8 @@ def neighbors(mesh: Mesh) -> Int[Array, "v n"]:
     n is the largest valence. A row with fewer than n neighbors is filled up with the vertex itself.
     So a gather needs no mask, and `active | active[neighbors(mesh)].any(axis=1)` is one step of a
     breadth-first search (Lee & Kim 2014). Real neighbors are where the entry differs from its row's
-    number.
+    number. Vertices at exactly the same position, as at hard edges and UV seams, are neighbors of
+    each other and have the same neighbors, so that a search crosses the seam.
 
     Takes any mesh: open, non-manifold, in pieces; `topology` tells which. Runs on the host: the
     faces must be concrete, since n depends on them, so call it outside `jit`. Not differentiable.
@@ -150,6 +155,8 @@ def neighbors(mesh: Mesh) -> Int[Array, "v n"]:
     (300, 6)
     """
     faces, count = np.asarray(mesh.faces, np.int64), len(mesh.vertices)
+    joined = _joined(mesh, faces)
+    faces = joined[faces]
     ahead = faces[:, [1, 2, 0]]
     # Both ways along each edge, as one number that sorts by vertex first.
     keys = np.concatenate([(faces * count + ahead).ravel(), (ahead * count + faces).ravel()])
@@ -157,11 +164,42 @@ def neighbors(mesh: Mesh) -> Int[Array, "v n"]:
     keys = keys[np.diff(keys, prepend=-1) > 0]
     vertex, other = np.divmod(keys, max(count, 1))
     vertex, other = vertex[vertex != other], other[vertex != other]
+    if (joined != np.arange(count)).any():
+        vertex, other = _to_all_copies(vertex, other, joined)
     valence = np.bincount(vertex, minlength=count)
     first = np.cumsum(valence) - valence
     table = np.repeat(np.arange(count, dtype=np.int32)[:, None], valence.max(initial=0), axis=1)
     table[vertex, np.arange(len(vertex)) - first[vertex]] = other
     return jnp.asarray(table)
+
+
+def _joined(mesh: Mesh, faces: np.ndarray) -> np.ndarray:
+    """Name for each vertex in a face the first such at its position; the others name themselves."""
+    vertices = np.asarray(mesh.vertices)
+    used = np.zeros(len(vertices), bool)
+    used[faces] = True
+    at = np.flatnonzero(used)
+    joined = np.arange(len(vertices))
+    # + 0 makes -0 and 0 the same position
+    joined[at] = at[first_of_equals(vertices[at] + 0)]
+    return joined
+
+
+def _to_all_copies(
+    vertex: np.ndarray, other: np.ndarray, joined: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Spread pairs of joined vertices over all that are joined, sorted; those are pairs too."""
+    copies = np.argsort(joined, kind="stable")
+    count = np.bincount(joined, minlength=len(joined))
+    first = np.cumsum(count) - count
+    several = np.flatnonzero(count > 1)
+    vertex, other = np.concatenate([vertex, several]), np.concatenate([other, several])
+    # Each pair once for every copy of its second, then of its first vertex.
+    vertex, other = np.repeat(vertex, count[other]), copies[ranges(first[other], count[other])]
+    vertex, other = copies[ranges(first[vertex], count[vertex])], np.repeat(other, count[vertex])
+    order = np.lexsort((other, vertex))
+    vertex, other = vertex[order], other[order]
+    return vertex[vertex != other], other[vertex != other]
 
 
 def _groups(one: np.ndarray, two: np.ndarray, *, number: int) -> tuple[int, np.ndarray]:

@@ -168,3 +168,36 @@ def test_topology_does_not_depend_on_order(rng):
         shuffled = rng.permutation(faces)[:, np.roll(np.arange(3), rng.integers(3))]
         names = rng.permutation(faces.max() + 1)
         assert topology(mesh_of(names[shuffled])) == known
+
+
+def split_up(mesh, rng):
+    """The same surface with a vertex for every corner of every face, in any order."""
+    corners = np.asarray(mesh.faces).ravel()
+    order = rng.permutation(len(corners))
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    vertices = np.asarray(mesh.vertices)[corners][order]
+    vertices[::2] = np.where(vertices[::2] == 0, -0.0, vertices[::2])
+    vertices = jnp.asarray(vertices)
+    return Mesh(vertices, jnp.asarray(place.reshape(-1, 3), jnp.int32), vertices), corners[order]
+
+
+def test_a_mesh_in_separate_faces_has_the_topology_of_the_whole(rng):
+    for mesh in (knot(300), make_mesh(*shapes.sphere(6, 8)), make_mesh(*shapes.QUAD)):
+        assert topology(split_up(mesh, rng)[0]) == topology(mesh)
+
+
+def test_neighbors_across_a_seam_are_those_of_the_whole(rng):
+    mesh = make_mesh(*shapes.sphere(4, 5))
+    apart, whole = split_up(mesh, rng)
+    table, known = np.asarray(neighbors(apart)), np.asarray(neighbors(mesh))
+    for vertex, row in enumerate(table):
+        real = row[row != vertex]
+        near = {whole[vertex], *known[whole[vertex]].tolist()}
+        assert real.tolist() == [w for w in range(len(whole)) if whole[w] in near and w != vertex]
+    # One step of a search on the parts takes what one on the whole does.
+    active = rng.random(len(whole)) < 0.1
+    at_whole = np.zeros(len(known), bool)
+    at_whole[whole[active]] = True
+    step = at_whole | at_whole[known].any(axis=1)
+    np.testing.assert_array_equal(active | active[table].any(axis=1), step[whole])
