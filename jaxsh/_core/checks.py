@@ -1,28 +1,240 @@
 """Argument checks: one sentence that says what was expected and what came."""
 
+import difflib
 import math
 import operator
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Float, Int
+
+# A light, an eye, a few thousand albedos: looking at more would take time of every call.
+_FEW = 2**16
 
 
-def as_float(value: ArrayLike) -> Float[Array, "..."]:
-    """Convert to a floating-point JAX array; integers become JAX's default float."""
+def as_float(value: ArrayLike, name: str = "") -> Float[Array, "..."]:
+    """Convert to a floating-point JAX array; integers become JAX's default float.
+
+    Raises `ValueError` for what is no array of real numbers, and for integers of 8 and 16 bits:
+    those are the codes of a picture, which mean nothing as they are.
+    """
     # What is a JAX array already is looked at in every frame.
-    array = value if isinstance(value, Array) else jnp.asarray(value)
+    array = value if isinstance(value, Array) else _as_array(value, name)
     if jnp.issubdtype(array.dtype, jnp.floating):
         return array
+    if not jnp.issubdtype(array.dtype, jnp.integer):
+        raise ValueError(f"expected real numbers{_for(name)}, got dtype {array.dtype}")
+    if array.dtype.itemsize < 4:
+        raise ValueError(
+            f"expected real numbers{_for(name)}, got dtype {array.dtype}: decode a picture's codes "
+            "first, cast other small integers to float"
+        )
+    return array.astype(jnp.result_type(float))
+
+
+def as_integer(value: ArrayLike, name: str) -> Int[Array, "..."]:
+    """Convert to an array of integers; raises `ValueError` for anything else."""
+    array = value if isinstance(value, Array) else _as_array(value, name)
     if jnp.issubdtype(array.dtype, jnp.integer):
-        return array.astype(jnp.result_type(float))
-    raise ValueError(f"expected real numbers, got dtype {array.dtype}")
+        return array
+    raise ValueError(f"expected integers for {name}, got dtype {array.dtype}")
 
 
-def is_concrete(value: Array) -> bool:
-    """True outside of tracing, where a value can be looked at at no cost to compiled code."""
-    return not isinstance(value, Tracer)
+def as_path(value: Any, name: str = "path") -> Path:
+    """Convert to a path; raises `TypeError` for what is none."""
+    if isinstance(value, str | os.PathLike):
+        return Path(value)
+    raise TypeError(f"expected {name} as a string or a path, got {described(value)}")
+
+
+def as_host_float(value: ArrayLike, name: str) -> Float[np.ndarray, "..."]:
+    """Convert to floating point on the host, integers to float64.
+
+    Raises `ValueError` for what is traced or no real numbers.
+    """
+    if isinstance(value, Tracer):
+        raise ValueError(
+            f"expected known values for {name}, got traced ones: this runs on the host, before "
+            "jit, vmap and grad"
+        )
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):  # lists of several lengths
+        raise ValueError(f"expected real numbers for {name}, got {described(value)}") from None
+    if jnp.issubdtype(array.dtype, jnp.floating):
+        return array
+    if array.dtype.kind in "iu" and array.dtype.itemsize >= 4:  # smaller are a picture's codes
+        return array.astype(np.float64)
+    raise ValueError(f"expected real numbers for {name}, got {described(value)}")
+
+
+def as_finite(
+    value: ArrayLike, name: str, *, least: float | None = None, wait: bool = False
+) -> Float[Array, "..."]:
+    """Convert as `as_float` does, and check as `check_finite` does."""
+    array = as_float(value, name)
+    # What was given on the host is looked at there, wherever its copy goes.
+    on_host = isinstance(value, np.ndarray | float) or not any(
+        isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value)
+    )
+    check_finite(name, value if on_host else array, least=least, wait=wait)
+    return array
+
+
+def check_finite(name: str, value: Any, *, least: float | None = None, wait: bool = False) -> None:
+    """Raises `ValueError` where a value that is at hand is NaN, infinite or below `least`.
+
+    At hand are arrays of up to 65,536 numbers on the host or on CPU devices of this process, where
+    a look at a light costs 2 µs. With `wait`, for what is made once, also larger ones and those on
+    an accelerator, which has to finish them first. What is traced is not looked at.
+    """
+    if isinstance(value, Array) and not (is_concrete(value) if wait else _at_hand(value)):
+        return
+    array = np.asarray(value)
+    if array.size > _FEW and not wait:
+        return
+    if least is None:
+        right = np.isfinite(array).all()
+    else:  # two reductions are faster than three; comparisons with NaN are false
+        right = array.size == 0 or (array.min() >= least and array.max() < math.inf)
+    if not right:
+        wrong = array[~(np.isfinite(array) & (True if least is None else array >= least))]
+        bound = "" if least is None else f" and >= {least:g}"
+        where = f" in {wrong.size} of {array.size} places" if array.ndim else ""
+        raise ValueError(f"{name} must be finite{bound}, got {wrong.flat[0]:g}{where}")
+
+
+def is_concrete(value: Any) -> bool:
+    """True where a value can be looked at: not traced, and not held by other processes."""
+    if isinstance(value, Tracer):
+        return False
+    return not isinstance(value, jax.Array) or value.is_fully_addressable
+
+
+def _at_hand(array: Array) -> bool:
+    return is_concrete(array) and next(iter(array.devices())).platform == "cpu"
+
+
+def _as_array(value: Any, name: str) -> Array:
+    try:
+        return jnp.asarray(value)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, jax.errors.JAXTypeError):  # of tracing
+            raise
+        raise ValueError(f"expected real numbers{_for(name)}, got {described(value)}") from None
+
+
+def described(value: Any) -> str:
+    """Says in a few words what was given."""
+    if value is None or isinstance(value, str | bool | int | float | complex | np.number):
+        text = repr(value)
+        return text if len(text) <= 60 else f"{text[:57]}…"
+    kind = type(value).__name__
+    if hasattr(value, "shape") and hasattr(value, "dtype"):
+        return f"an array of shape {value.shape} and dtype {value.dtype}"
+    if isinstance(value, list | tuple | dict | set):
+        return f"a {kind} of {len(value)}"
+    if isinstance(value, type):
+        return f"the class {value.__name__} itself"
+    if callable(value) and hasattr(value, "__name__"):
+        return f"the function {value.__name__}"
+    return f"{_article(kind)} {kind}"
+
+
+def check_type(name: str, value: Any, *classes: type) -> None:
+    """Raises `TypeError` unless a value is of one of the classes."""
+    if not isinstance(value, classes):
+        wanted = " or ".join(f"{_article(c.__name__)} {c.__name__}" for c in classes)
+        raise TypeError(f"expected {name} as {wanted}, got {described(value)}")
+
+
+def check_all(name: str, values: Any, *classes: type, least: int = 1) -> None:
+    """Raises unless values are a list or a tuple of at least `least` of one of the classes."""
+    wanted = " or ".join(c.__name__ for c in classes)
+    if not isinstance(values, list | tuple):
+        raise TypeError(f"expected {name} as a list or tuple of {wanted}, got {described(values)}")
+    if len(values) < least:
+        raise ValueError(f"expected {name} as at least {least} of {wanted}, got {len(values)}")
+    for value in values:
+        if not isinstance(value, classes):
+            raise TypeError(f"expected {name} as all of {wanted}, got {described(value)}")
+
+
+def check_function(name: str, value: Any) -> None:
+    """Raises `TypeError` unless a value can be called."""
+    if not callable(value):
+        raise TypeError(f"expected {name} as a function, got {described(value)}")
+
+
+def check_choice(name: str, value: Any, options: Iterable[Any]) -> None:
+    """Raises `ValueError` that names the nearest option unless a value is one of them."""
+    options = tuple(options)
+    # A string, first: an array is neither equal to one nor unequal.
+    if isinstance(value, str) and value in options:
+        return
+    said = ", ".join(map(str, options))
+    raise ValueError(
+        f"{name} must be one of {said}, got {described(value)}{nearest(value, options)}"
+    )
+
+
+def check_options(name: str, options: Iterable[str], known: Iterable[str]) -> None:
+    """Raises `TypeError` that names the nearest option for one that a function does not have."""
+    known = tuple(known)
+    for option in options:
+        if option not in known:
+            near = nearest(option, known) or f"; it has {', '.join(known)}"
+            raise TypeError(f"{name} has no option {option!r}{near}")
+
+
+def nearest(value: Any, options: Iterable[Any]) -> str:
+    """Says which option was meant, or nothing."""
+    if not isinstance(value, str):
+        return ""
+    known = [option for option in options if isinstance(option, str)]
+    near = difflib.get_close_matches(value.lower(), known, n=1)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def check_flag(name: str, value: Any) -> bool:
+    """The flag as a Python bool; raises `ValueError` unless it is True or False."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise ValueError(f"{name} must be True or False, got {described(value)}")
+
+
+def check_number(
+    name: str,
+    value: Any,
+    *,
+    least: float = -math.inf,
+    most: float = math.inf,
+    above: float = -math.inf,
+    infinite: bool = False,
+) -> float:
+    """A Python number known at trace time; raises `ValueError` where it is none or out of range."""
+    number = None
+    if isinstance(value, int | float | np.number) and not isinstance(
+        value, bool | np.complexfloating
+    ):
+        number = float(value)
+    elif isinstance(value, np.ndarray | jax.Array) and is_concrete(value):
+        number = float(value) if value.ndim == 0 and value.dtype.kind in "fiu" else None
+    if number is None or not (least <= number <= most and number > above):
+        bounds = [f">= {least:g}"] if least > -math.inf else []
+        bounds += [f"> {above:g}"] if above > -math.inf else []
+        bounds += [f"<= {most:g}"] if most < math.inf else []
+        range_ = f" {' and '.join(bounds)}" if bounds else ""
+        raise ValueError(f"{name} must be a number{range_}, got {described(value)}")
+    if not infinite and math.isinf(number):
+        raise ValueError(f"{name} must be finite, got {described(value)}")
+    return number
 
 
 def align(*arrays: Array) -> tuple[Array, ...]:
@@ -43,28 +255,52 @@ def check_batches(**shapes: tuple[int, ...]) -> None:
         raise ValueError(f"leading axes must broadcast, got {said}") from None
 
 
+def check_vectors(name: str, array: Array) -> None:
+    """Raises `ValueError` unless the last axis holds x, y and z."""
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise ValueError(f"expected {name} (..., 3) with x, y, z last, got shape {array.shape}")
+
+
+def check_coefficients(name: str, array: Array) -> int:
+    """The degree of functions (..., K); raises `ValueError` where K is not a square."""
+    count = array.shape[-1] if array.ndim else 0
+    bands = math.isqrt(count)
+    if bands == 0 or bands**2 != count:
+        raise ValueError(
+            f"expected {name} (..., K) with K = (degree + 1)² = 1, 4, 9, 16, … coefficients on the "
+            f"last axis, got shape {array.shape}"
+        )
+    return bands - 1
+
+
 def flatten_batch(array: Float[Array, "*batch n"]) -> Float[Array, "rows n"]:
     """All leading axes as one, an empty one too, whose size `reshape` could not infer."""
     return array.reshape(math.prod(array.shape[:-1]), array.shape[-1])
 
 
-def check_degree(degree: int) -> int:
+def check_degree(degree: int, name: str = "degree") -> int:
     """The degree as a Python int, or a `ValueError` that says what was expected."""
-    try:
-        value = operator.index(degree)
-    except TypeError:
-        value = -1
-    if value < 0 or isinstance(degree, bool):
-        raise ValueError(f"degree must be an integer >= 0 known at trace time, got {degree!r}")
-    return value
+    return _integer(name, degree, 0, " known at trace time")
 
 
 def check_size(name: str, value: int, least: int = 1) -> int:
     """The size as a Python int; raises `ValueError` unless it is an integer >= `least`."""
+    return _integer(name, value, least, "")
+
+
+def _integer(name: str, value: Any, least: int, more: str) -> int:
     try:
-        size = operator.index(value)
+        number = operator.index(value)
     except TypeError:
-        size = least - 1
-    if size < least:
-        raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
-    return size
+        number = least - 1
+    if number < least or isinstance(value, bool):
+        raise ValueError(f"{name} must be an integer >= {least}{more}, got {described(value)}")
+    return number
+
+
+def _for(name: str) -> str:
+    return f" for {name}" if name else ""
+
+
+def _article(noun: str) -> str:
+    return "an" if noun[:1] in "AEIOUaeiou" else "a"

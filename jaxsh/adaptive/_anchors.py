@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import align, check_degree
+from .._core.checks import align, check_degree, check_flag, check_number, check_type
 from .._core.xla import materialize
 from ..transfer import (
     AbstractTransfer,
@@ -111,6 +111,7 @@ class AnchorSet(eqx.Module):
         check_whole_degree("anchors", light, self.degree)
         check_one_exponent(material, self.num_points)
         check_one_device("An AnchorSet", self.rows.samples)
+        distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
         limits = scalars(light.dtype, threshold=threshold, exposure=exposure)
         limits = limits["threshold"], limits["exposure"]
         return _shade_anchors(light, eye, material, self, limits, distant, normalized)
@@ -148,14 +149,15 @@ def make_anchors(
     """
     from scipy.spatial import KDTree
 
+    check_type("transfer", transfer, Transfer)
+    quantized = check_flag("quantized", quantized)
     check_one_device("make_anchors", transfer)
     check_known("make_anchors", transfer)
     count = transfer.num_points
-    if not 0 < share <= 1 or count < NEAREST:
-        raise ValueError(
-            f"expected a share in (0, 1] of at least {NEAREST} vertices, got {share} of {count}"
-        )
-    if check_degree(base) > transfer.degree:
+    share = check_number("share", share, above=0.0, most=1.0)
+    if count < NEAREST:
+        raise ValueError(f"expected at least {NEAREST} vertices to share, got {count}")
+    if check_degree(base, "base") > transfer.degree:
         raise ValueError(f"expected base of at most {transfer.degree}, got {base}")
     points, normals = np.asarray(transfer.positions), np.asarray(transfer.normals)
     extent = max(float(np.ptp(points, axis=0).max()) / 2, 1e-30)
@@ -201,6 +203,12 @@ class Anchors(AbstractMethod):
     normalized: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):
+        if self.anchors is not None:
+            check_type("anchors", self.anchors, AnchorSet)
+        check_number("share", self.share, above=0.0, most=1.0)
+        check_degree(self.base, "base")
+        for name in ("quantized", "distant", "normalized"):
+            check_flag(name, getattr(self, name))
         for name in ("threshold", "exposure"):
             checked_scalar(name, getattr(self, name))
 

@@ -1,12 +1,12 @@
 """Lee and Kim's filter: with every vertex under a mask, and compacted."""
 
-import operator
 from typing import Literal
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
+from .._core.checks import check_choice, check_degree, check_flag, check_size, check_type
 from ..harmonics import degree_of
 from ..transfer import AbstractTransfer, Material
 from ._filter import Filter, filtered
@@ -17,7 +17,6 @@ from ._method import (
     checked_scalar,
     plain_transfer,
     scalars,
-    suggestion,
 )
 from ._result import AdaptiveResult
 
@@ -39,15 +38,13 @@ class AbstractFilter(AbstractMethod):
     normalized: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):
-        if operator.index(self.base) < 0:
-            raise ValueError(f"expected base >= 0, got {self.base}")
-        if operator.index(self.rings) < 0:
-            raise ValueError(f"expected rings >= 0, got {self.rings}")
-        if self.fallback not in FALLBACKS:
-            raise ValueError(
-                f"expected fallback to be one of {FALLBACKS}, got {self.fallback!r}; "
-                f"{suggestion(self.fallback, FALLBACKS)}"
-            )
+        check_degree(self.base, "base")
+        check_size("rings", self.rings, least=0)
+        check_choice("fallback", self.fallback, FALLBACKS)
+        for name in ("smoothing", "distant", "normalized"):
+            check_flag(name, getattr(self, name))
+        if self.previous is not None:
+            check_type("previous", self.previous, AdaptiveResult)
         for name in ("threshold", "exposure", "hysteresis"):
             checked_scalar(name, getattr(self, name))
 

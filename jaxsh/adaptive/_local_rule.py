@@ -8,6 +8,7 @@ from numpy.polynomial.chebyshev import chebpts1
 from numpy.polynomial.legendre import legval, legvander
 from numpy.polynomial.polynomial import polyval
 
+from .._core.checks import check_number, check_size
 from .._core.host import read_only_cache
 from ..harmonics import degrees, phong
 from ..sphere import fibonacci
@@ -99,10 +100,8 @@ def _powers(degree: int, lowest: float, terms: int) -> Float[np.ndarray, "terms 
 
 
 def check_rule(count: int, exponent: float) -> None:
-    if count < 1 or not exponent > -1:
-        raise ValueError(
-            f"expected directions of at least 1 and exponent above -1, got {count} and {exponent}"
-        )
+    check_size("directions", count)
+    check_number("exponent", exponent, above=-1.0)
 
 
 def _covariance(left, right, degree: int, exponent: float) -> Float[np.ndarray, "m n"]:

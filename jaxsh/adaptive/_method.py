@@ -2,8 +2,6 @@
 
 import abc
 import dataclasses
-import difflib
-from collections.abc import Iterable
 
 import equinox as eqx
 import jax
@@ -11,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, is_concrete
+from .._core.checks import as_float, check_options, check_type, is_concrete
 from .._core.xla import on_mesh
 from ..harmonics import degree_of
 from ..transfer import AbstractTransfer, Material, Transfer
@@ -33,10 +31,7 @@ class AbstractMethod(eqx.Module):
 
     def __new__(cls, *_, **options):
         # Python names the unknown option; this names the one that was meant, too.
-        known = [field.name for field in dataclasses.fields(cls)]
-        for name in options:
-            if name not in known:
-                raise TypeError(f"{cls.__name__} has no option {name!r}; {suggestion(name, known)}")
+        check_options(cls.__name__, options, [field.name for field in dataclasses.fields(cls)])
         return super().__new__(cls)
 
     @abc.abstractmethod
@@ -50,14 +45,9 @@ class AbstractMethod(eqx.Module):
         """Shade a frame."""
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
-    """Names the nearest of the known names, or all of them where none is near."""
-    near = difflib.get_close_matches(name, known, n=1)
-    return f"did you mean {near[0]!r}?" if near else f"it has {', '.join(known)}"
-
-
 def checked_frame(light, transfer: AbstractTransfer, eye, material: Material):
     """Casts light, eye and material to the transfer's dtype; one light of degree 2 or above."""
+    check_type("transfer", transfer, AbstractTransfer)
     count, dtype = transfer.num_points, transfer.dtype
     light = checked_one_light(light, count, transfer.degree, dtype)
     if degree_of(light.shape[-1]) < 2:
@@ -67,6 +57,7 @@ def checked_frame(light, transfer: AbstractTransfer, eye, material: Material):
 
 def check_set(kind: str, num_points: int, degree: int, transfer: AbstractTransfer) -> None:
     """Raises `ValueError` unless a set is of as many vertices and of the degree of a transfer."""
+    check_type("transfer", transfer, AbstractTransfer)
     if num_points != transfer.num_points or degree != transfer.degree:
         raise ValueError(
             f"expected {kind} of {transfer.num_points} vertices and degree {transfer.degree}, got "
@@ -83,6 +74,7 @@ def check_whole_degree(kind: str, light: Array, degree: int) -> None:
 
 
 def check_one_exponent(material: Material, count: int) -> None:
+    check_type("material", material, Material)
     if material.exponent.ndim:
         raise ValueError(f"expected one exponent, got one for each of {count} vertices")
 
@@ -92,16 +84,17 @@ def checked_scalar(name: str, value: ArrayLike) -> Float[Array, ""]:
 
     A Python number keeps no dtype of its own.
     """
-    array = as_float(value)
+    array = as_float(value, name)
     if array.ndim:
         raise ValueError(f"expected {name} as a number, got shape {array.shape}")
     if is_concrete(array) and not np.asarray(array) >= 0:
-        raise ValueError(f"{name} must be >= 0, got {value}")
+        raise ValueError(f"{name} must be >= 0, got {float(array):g}")
     return array
 
 
 def plain_transfer(name: str, transfer: AbstractTransfer) -> Transfer:
     """Returns the coefficients that a method needs; raises `ValueError` where they are not held."""
+    check_type("transfer", transfer, AbstractTransfer)
     plain = transfer.glossy_form(transfer.degree)
     if not isinstance(plain, Transfer):
         raise ValueError(

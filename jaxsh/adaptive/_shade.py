@@ -2,10 +2,11 @@
 
 from jaxtyping import ArrayLike, Float
 
+from .._core.checks import check_choice, check_type
 from ..transfer import AbstractTransfer, Material
 from ._anchors import Anchors
 from ._levels import Levels, Masks
-from ._method import AbstractMethod, suggestion
+from ._method import AbstractMethod
 from ._result import AdaptiveResult
 from ._tiles import Tiles
 from ._two_stage import TwoStage
@@ -67,12 +68,12 @@ def shade(
     >>> frame = jnp.ones((3, 9)), made, eye, transfer.Material(0.5, 0.5, 8.0)
     >>> adaptive.shade(*frame, adaptive.Tiles(num_tiles=3, block=16)).color.shape
     (50, 3)
-    >>> adaptive.shade(*frame, "tile")
+    >>> adaptive.shade(*frame, "tile")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    ValueError: there is no method 'tile'; did you mean 'tiles'?
+    ValueError: method must be one of ... got 'tile'; did you mean 'tiles'?
     """
     if isinstance(method, str):
-        if method not in METHODS:
-            raise ValueError(f"there is no method {method!r}; {suggestion(method, METHODS)}")
+        check_choice("method", method, METHODS)
         method = METHODS[method]()
+    check_type("method", method, AbstractMethod)
     return method(light, transfer, eye, material)

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Int8
 
-from .._core.checks import check_degree
+from .._core.checks import check_degree, check_flag, check_type
 from .._core.linalg import matmul, tall_product
 from .._core.xla import materialize
 from ..harmonics import degree_of
@@ -105,10 +105,12 @@ def stage(
     >>> adaptive.stage(transfer.unshadowed(up, up, degree=4), base=1).degrees
     (1, 2, 4)
     """
+    check_type("transfer", transfer, Transfer)
+    quantized = check_flag("quantized", quantized)
     degree = transfer.degree if degree is None else check_degree(degree)
-    base = check_degree(base)
+    base = check_degree(base, "base")
     default = min(max(3 * degree // 5, base + 1), degree)
-    middle = default if middle is None else check_degree(middle)
+    middle = default if middle is None else check_degree(middle, "middle")
     if not base <= middle <= degree <= transfer.degree:
         raise ValueError(
             f"expected base <= middle <= degree <= the transfer's, {transfer.degree}, got {base}, "
@@ -131,6 +133,7 @@ def diffuse_part(
     """Returns the diffuse part of a prepared set: the given one, eight bits, or the transfer."""
     if given is None:
         return quantize(transfer) if quantized else transfer
+    check_type("diffuse", given, AbstractTransfer)
     if given.num_points != transfer.num_points or given.degree != transfer.degree:
         raise ValueError(
             f"expected a diffuse part of {transfer.num_points} vertices and degree "

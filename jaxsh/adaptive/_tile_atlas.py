@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
+from .._core.checks import check_number, check_size, check_type
 from ..sphere import fibonacci
 from ..transfer import AbstractTransfer, Transfer, quantize
 from ..transfer._glossy_kernels import checked_eye
@@ -46,7 +47,7 @@ class TileAtlas(eqx.Module):
 
     def tiling(self, view: int) -> Tiling:
         """Return the tiling of a view, by its number."""
-        if not 0 <= view < len(self.eyes):
+        if check_size("view", view, least=0) >= len(self.eyes):
             raise ValueError(f"expected a view from 0 to {len(self.eyes) - 1}, got {view}")
         return Tiling(self.permutation[view], self.tile[view], self.axes[view])
 
@@ -101,9 +102,11 @@ def make_tile_atlas(
     (4, 26, 16)
     """
     check_rule(directions, exponent)
+    check_type("transfer", transfer, Transfer)
     check_known("make_tile_atlas", transfer)
-    if views < 1:
-        raise ValueError(f"expected at least 1 view, got {views}")
+    views = check_size("views", views)
+    if distance is not None:
+        distance = check_number("distance", distance, above=0.0)
     towards = fibonacci(views).directions.astype(transfer.positions.dtype)
     distant, center = distance is None, jnp.zeros((3,), transfer.positions.dtype)
     eyes = towards
@@ -147,7 +150,9 @@ class TileFollower:
     def __init__(
         self, atlas: TileAtlas, transfer: Transfer, eye: Float[ArrayLike, " 3"], *, keep: int = 4
     ):
-        if keep < 2:
+        check_type("atlas", atlas, TileAtlas)
+        check_type("transfer", transfer, Transfer)
+        if check_size("keep", keep) < 2:
             raise ValueError(f"expected keep of at least 2, this set and the next, got {keep}")
         self._atlas, self._transfer, self._keep = atlas, transfer, keep
         self._diffuse = quantize(transfer)  # which all sets share

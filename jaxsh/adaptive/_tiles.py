@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int, Int8
 
+from .._core.checks import check_flag, check_size, check_type
 from .._core.linalg import matmul
 from .._core.xla import materialize
 from ..harmonics import degree_of, evaluate, phong, rotate
@@ -119,6 +120,7 @@ class TileSet(eqx.Module):
         eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
         check_one_exponent(material, count)
         check_one_device("A TileSet", self.samples)
+        distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
         return _shade_tiles(light, eye, material, self, distant, normalized)
 
 
@@ -200,6 +202,9 @@ def arrange(
     (7, 9, 8)
     """
     check_rule(directions, exponent)
+    check_type("transfer", transfer, Transfer)
+    check_type("tiling", tiling, Tiling)
+    quantized = check_flag("quantized", quantized)
     check_one_device("arrange", transfer)
     check_known("arrange", transfer, tiling)
     permutation, vertices = np.asarray(tiling.permutation), transfer.num_points
@@ -288,6 +293,15 @@ class Tiles(AbstractMethod):
     distant: bool = eqx.field(static=True, default=False)
     normalized: bool = eqx.field(static=True, default=True)
 
+    def __check_init__(self):
+        if self.tiles is not None:
+            check_type("tiles", self.tiles, TileSet)
+        check_size("num_tiles", self.num_tiles)
+        check_size("block", self.block)
+        check_rule(self.directions, 1.0 if self.exponent is None else self.exponent)
+        for name in ("quantized", "distant", "normalized"):
+            check_flag(name, getattr(self, name))
+
     def __call__(
         self,
         light: Float[ArrayLike, "3 k"],
@@ -297,6 +311,7 @@ class Tiles(AbstractMethod):
     ) -> AdaptiveResult:
         tiles = self.tiles
         if tiles is None:
+            check_type("transfer", transfer, AbstractTransfer)
             check_one_exponent(material, transfer.num_points)
             check_known("Tiles without a tile set", transfer, eye, material)
             exponent = float(material.exponent) if self.exponent is None else self.exponent

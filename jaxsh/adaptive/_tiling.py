@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
+from .._core.checks import as_host_float, check_flag, check_size, check_type
 from ..transfer import Transfer
 from ..transfer._glossy_kernels import checked_eye, mirrored, rows_of
 from ._method import check_known, check_one_device
@@ -64,15 +65,18 @@ def make_tiling(
     >>> adaptive.make_tiling(made, points[0], num_tiles=3, block=8).permutation.shape
     (7, 8)
     """
-    if num_tiles < 1 or block < 1:
-        raise ValueError(f"expected num_tiles and block of at least 1, got {num_tiles} and {block}")
+    check_type("transfer", transfer, Transfer)
+    distant = check_flag("distant", distant)
+    num_tiles, block = check_size("num_tiles", num_tiles), check_size("block", block)
     check_one_device("make_tiling", transfer)
     check_known("make_tiling", transfer, eye)
     eye = checked_eye(eye, transfer.positions.dtype)
     axis, units = _mirrored(eye, transfer.positions, transfer.normals, distant)
     axis = np.asarray(axis, np.float32)
     facing = np.sum(np.asarray(units) * axis, axis=0)
-    areas = vertex_areas(transfer) if areas is None else np.asarray(areas)
+    areas = vertex_areas(transfer) if areas is None else as_host_float(areas, "areas")
+    if areas.shape != (transfer.num_points,):
+        raise ValueError(f"expected areas ({transfer.num_points},), got shape {areas.shape}")
     weights = areas * (np.maximum(facing, 0) + 0.05)
     blocks, last = -(-len(weights) // block), len(weights) - 1
     # What fills the last block up weighs nothing.

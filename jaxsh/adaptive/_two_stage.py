@@ -56,7 +56,7 @@ class TwoStage(AbstractFilter):
 
     def __check_init__(self):
         if self.middle is not None:
-            check_degree(self.middle)
+            check_degree(self.middle, "middle")
 
     def __call__(
         self,

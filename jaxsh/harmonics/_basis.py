@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import as_float, check_degree
+from .._core.checks import as_float, check_degree, check_vectors, described
 from .._core.vectors import components_first, normalize
 from .._core.xla import materialize, on_mesh
 from ._indexing import degrees
@@ -79,13 +79,12 @@ def evaluate_with_gradient(
 
 
 def _checked(vectors, degree, axis):
-    if axis not in (0, -1):
+    if not isinstance(axis, int) or isinstance(axis, bool) or axis not in (0, -1):
         raise ValueError(
-            f"axis must be -1, coefficients last, or 0, coefficients first, got {axis}"
+            f"axis must be -1, coefficients last, or 0, coefficients first, got {described(axis)}"
         )
-    vectors = as_float(vectors)
-    if vectors.ndim == 0 or vectors.shape[-1] != 3:
-        raise ValueError(f"expected vectors (..., 3) with x, y, z last, got shape {vectors.shape}")
+    vectors = as_float(vectors, "vectors")
+    check_vectors("vectors", vectors)
     return vectors, check_degree(degree), axis
 
 

@@ -8,11 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import as_float
+from .._core.checks import as_float, check_choice, check_coefficients
 from .._core.linalg import dot, einsum, matmul
 from .._core.xla import keep_rows, on_mesh
 from ._basis import evaluate
-from ._indexing import degree_of, degrees, orders
+from ._indexing import degrees, orders
 from ._tables import legendre
 from ._windows import damping
 from ._zonal import clamped_cosine, convolve
@@ -73,14 +73,12 @@ def dering(
     >>> round(float(for_surfaces), 1), round(float(for_itself), 1)
     (0.5, 0.9)
     """
-    coefficients = as_float(coefficients)
-    degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
+    coefficients = as_float(coefficients, "coefficients")
+    degree = check_coefficients("coefficients", coefficients)
+    check_choice("of", of, ("irradiance", "light"))
+    judged = coefficients
     if of == "irradiance":
         judged = convolve(coefficients, clamped_cosine(degree))
-    elif of == "light":
-        judged = coefficients
-    else:
-        raise ValueError(f"of must be 'irradiance' or 'light', got {of!r}")
 
     def least(judged):
         if judged.ndim > 1:

@@ -1,12 +1,11 @@
 """Order of the coefficients: i = l(l+1) + m, degree l = 0..L, order m = -l..l ("ACN")."""
 
 import math
-import operator
 
 import numpy as np
 from jaxtyping import Int
 
-from .._core.checks import check_degree
+from .._core.checks import check_degree, described
 
 
 def num_coefficients(degree: int) -> int:
@@ -34,10 +33,12 @@ def degree_of(count: int) -> int:
     >>> harmonics.degree_of(9)
     2
     """
-    bands = math.isqrt(count) if isinstance(count, int | np.integer) and count > 0 else 0
+    whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
+    bands = math.isqrt(count) if whole and count > 0 else 0
     if bands == 0 or bands**2 != count:
         raise ValueError(
-            f"expected (degree + 1)² = 1, 4, 9, 16, … coefficients on the last axis, got {count}"
+            "expected (degree + 1)² = 1, 4, 9, 16, … coefficients on the last axis, got "
+            f"{described(count)}"
         )
     return bands - 1
 
@@ -53,10 +54,10 @@ def index(l: int, m: int) -> int:
     >>> harmonics.index(2, -1)
     5
     """
-    l, m = operator.index(l), operator.index(m)
-    if l < 0 or abs(m) > l:
-        raise ValueError(f"expected l >= 0 and -l <= m <= l, got l = {l}, m = {m}")
-    return l * (l + 1) + m
+    l = check_degree(l, "l")
+    if not isinstance(m, int | np.integer) or isinstance(m, bool) or abs(m) > l:
+        raise ValueError(f"expected m as an integer from -l to l, got {described(m)} for l = {l}")
+    return l * (l + 1) + int(m)
 
 
 def degrees(degree: int) -> Int[np.ndarray, " k"]:

@@ -12,7 +12,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_batches, check_degree, flatten_batch
+from .._core.checks import (
+    align,
+    as_float,
+    check_batches,
+    check_coefficients,
+    check_degree,
+    flatten_batch,
+)
 from .._core.host import read_only_cache
 from .._core.linalg import matmul
 from .._core.xla import in_blocks, on_mesh
@@ -65,8 +72,7 @@ def product(
     >>> squared.shape, round(float(squared[0]), 3)  # 1/√(4π)
     ((9,), 0.282)
     """
-    f, g, f_degree, g_degree = _checked_pair(f, g)
-    check_batches(f=f.shape, g=g.shape)
+    (f, f_degree), (g, g_degree) = _checked(f=f, g=g)
     degree = max(f_degree, g_degree) if degree is None else check_degree(degree)
     return _product(f, g, degree)
 
@@ -90,10 +96,7 @@ def triple_integral(
     >>> round(float(harmonics.triple_integral(z, z, jnp.ones(1))), 3)  # 1/√(4π)
     0.282
     """
-    f, g, *_ = _checked_pair(f, g)
-    g, h, _, h_degree = _checked_pair(g, h)
-    check_batches(f=f.shape, g=g.shape, h=h.shape)
-    f = f.astype(h.dtype)
+    (f, _), (g, _), (h, h_degree) = _checked(f=f, g=g, h=h)
     return jnp.sum(jnp.multiply(*align(_product(f, g, h_degree), h)), axis=-1)
 
 
@@ -122,8 +125,7 @@ def product_matrix(
     >>> round(float(matrix[2, 2]), 3), round(float(matrix[2, 3]), 3) + 0.0
     (1.0, 0.0)
     """
-    f = as_float(f)
-    f_degree = degree_of(f.shape[-1] if f.ndim else 0)
+    ((f, f_degree),) = _checked(f=f)
     return _product_matrix(f, f_degree if degree is None else check_degree(degree))
 
 
@@ -166,9 +168,10 @@ def _product_matrix(f, degree: int):
     return matmul(jnp.multiply(*align(samples[..., None, :], basis)), basis.T)
 
 
-def _checked_pair(f: ArrayLike, g: ArrayLike):
-    f, g = as_float(f), as_float(g)
-    f_degree = degree_of(f.shape[-1] if f.ndim else 0)
-    g_degree = degree_of(g.shape[-1] if g.ndim else 0)
-    dtype = jnp.promote_types(f.dtype, g.dtype)
-    return f.astype(dtype), g.astype(dtype), f_degree, g_degree
+def _checked(**functions: ArrayLike) -> list[tuple[Array, int]]:
+    """Functions in their common dtype, with their degrees."""
+    arrays = {name: as_float(value, name) for name, value in functions.items()}
+    degrees = [check_coefficients(name, array) for name, array in arrays.items()]
+    check_batches(**{name: array.shape for name, array in arrays.items()})
+    dtype = functools.reduce(jnp.promote_types, (array.dtype for array in arrays.values()))
+    return [(a.astype(dtype), d) for a, d in zip(arrays.values(), degrees, strict=True)]

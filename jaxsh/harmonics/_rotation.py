@@ -1,16 +1,24 @@
 """Rotation of functions on the sphere."""
 
 import functools
+import math
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_batches, check_degree, is_concrete
+from .._core.checks import (
+    align,
+    as_float,
+    check_batches,
+    check_coefficients,
+    check_degree,
+    is_concrete,
+)
 from .._core.linalg import einsum, matmul
 from ._basis import evaluate
-from ._indexing import degree_of, degrees, orders
+from ._indexing import degrees, orders
 from ._tables import even_grid
 
 
@@ -67,8 +75,8 @@ def rotate(
     >>> round(float(y[1]), 3)  # along +y: √(3/4π)
     0.489
     """
-    coefficients = as_float(coefficients)
-    degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
+    coefficients = as_float(coefficients, "coefficients")
+    degree = check_coefficients("coefficients", coefficients)
     rotation = _checked_rotation(rotation).astype(coefficients.dtype)
     check_batches(coefficients=coefficients.shape, rotation=rotation.shape[:-1])
     matrix = _rotation_matrix(rotation, degree)
@@ -100,11 +108,11 @@ def rotate_z(
     >>> round(float(harmonics.rotate_z(x, jnp.pi / 2)[1]), 3)  # along +y: √(3/4π)
     0.489
     """
-    coefficients = as_float(coefficients)
-    degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
+    coefficients = as_float(coefficients, "coefficients")
+    degree = check_coefficients("coefficients", coefficients)
     m = orders(degree)
     mirrored = coefficients[..., np.arange(len(m), dtype=np.int32) - 2 * m]
-    phase = jnp.asarray(angle, coefficients.dtype)[..., None]
+    phase = as_float(angle, "angle").astype(coefficients.dtype)[..., None]
     check_batches(coefficients=coefficients.shape, angle=phase.shape)
     phase = jnp.multiply(*align(phase, jnp.asarray(m, phase.dtype)))
     coefficients, mirrored, phase = align(coefficients, mirrored, phase)
@@ -123,14 +131,17 @@ def _rotation_matrix(rotation: Float[Array, "*batch 3 3"], degree: int) -> Float
 
 
 def _checked_rotation(rotation: ArrayLike) -> Float[Array, "*batch 3 3"]:
-    rotation = as_float(rotation)
+    rotation = as_float(rotation, "rotation")
     if rotation.shape[-2:] != (3, 3):
-        raise ValueError(f"expected rotation matrices (..., 3, 3), got shape {rotation.shape}")
+        raise ValueError(f"expected rotation (..., 3, 3), matrices, got shape {rotation.shape}")
     if is_concrete(rotation):
         matrix = np.asarray(rotation, np.float64)
-        error = np.max(np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)), initial=0.0)
+        error = math.nan
+        if np.isfinite(matrix).all():
+            error = np.max(np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)), initial=0.0)
         if not error <= 1e-3:
             raise ValueError(
-                f"expected orthogonal matrices, but R Rᵀ is off the identity by {error:.1e}"
+                f"expected rotation as orthogonal matrices, but R Rᵀ is off the identity by "
+                f"{error:.1e}"
             )
     return rotation

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from .._core.checks import check_degree
+from .._core.checks import as_host_float, check_degree
 from .._core.host import read_only_cache
 from ._indexing import degrees, index, orders
 
@@ -180,10 +180,9 @@ def legendre(cos_theta: Float[np.ndarray, " n"], degree: int) -> Float[np.ndarra
     >>> harmonics.legendre(np.array([0.0, 1.0]), degree=2).shape
     (9, 2)
     """
-    check_degree(degree)
-    z = np.asarray(cos_theta, np.float64)
-    if np.any(np.abs(z) > 1):
-        raise ValueError(f"cos_theta must be in [-1, 1], got {np.max(np.abs(z))} in size")
+    degree, z = check_degree(degree), as_host_float(cos_theta, "cos_theta").astype(np.float64)
+    if (wrong := ~(np.abs(z) <= 1)).any():
+        raise ValueError(f"cos_theta must be in [-1, 1], got {z[wrong].flat[0]:g}")
     sin_theta = np.sqrt((1 - z) * (1 + z))
     table = np.zeros(((degree + 1) ** 2, *z.shape))
     for m in range(degree + 1):

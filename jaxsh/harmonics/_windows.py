@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_degree, is_concrete
+from .._core.checks import align, as_float, check_choice, check_degree, is_concrete
 from ._indexing import degrees, orders
 
 WINDOWS = ("none", "hann", "lanczos", "zonal-sinc")
@@ -35,6 +35,7 @@ def window(
     >>> [round(float(w), 3) for w in harmonics.window("hann", degree=1)]
     [1.0, 0.5, 0.5, 0.5]
     """
+    check_choice("kind of window", kind, WINDOWS)
     l, bands = degrees(degree), check_degree(degree) + 1
     match kind:
         case "none":
@@ -45,8 +46,6 @@ def window(
             values = np.sinc(l / bands)
         case "zonal-sinc":
             values = np.where(orders(degree) == 0, np.sinc(l / bands), 1.0)
-        case _:
-            raise ValueError(f"window must be one of {', '.join(WINDOWS)}, got {kind!r}")
     return jnp.asarray(values, jnp.result_type(float))
 
 
@@ -71,9 +70,10 @@ def damping(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "
     >>> round(float(window[1]), 3), round(float(window[4]), 3)
     (0.5, 0.1)
     """
-    strength = as_float(strength)
-    if is_concrete(strength) and np.any(np.asarray(strength) < 0):
-        raise ValueError(f"a window's strength must be at least 0, got {strength}")
+    strength, degree = as_float(strength, "strength"), check_degree(degree)
+    if is_concrete(strength) and (negative := np.asarray(strength) < 0).any():
+        found = np.asarray(strength)[negative].flat[0]
+        raise ValueError(f"a window's strength must be at least 0, got {found:g}")
     strength = strength[..., None]
     squared = ((degrees(degree) * (degrees(degree) + 1.0)) ** 2).astype(strength.dtype)
     strength, squared = align(strength, jnp.asarray(squared))

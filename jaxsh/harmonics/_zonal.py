@@ -4,8 +4,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_degree, is_concrete
-from ._indexing import degree_of, degrees
+from .._core.checks import (
+    align,
+    as_float,
+    check_batches,
+    check_coefficients,
+    check_degree,
+    check_flag,
+    is_concrete,
+)
+from ._indexing import degrees
 
 
 def clamped_cosine(degree: int) -> Float[Array, " bands"]:
@@ -49,10 +57,13 @@ def phong(
     >>> harmonics.phong(32.0, degree=4, normalized=True).shape
     (5,)
     """
-    check_degree(degree)
-    k = as_float(exponent)
-    if is_concrete(k) and not np.all((np.asarray(k) > -1) & np.isfinite(k)):
-        raise ValueError(f"a Phong exponent must be finite and above -1, got {k}")
+    degree, normalized = check_degree(degree), check_flag("normalized", normalized)
+    k = as_float(exponent, "exponent")
+    if is_concrete(k):
+        known = np.asarray(k)
+        if (wrong := ~((known > -1) & np.isfinite(known))).any():
+            found = known[wrong].flat[0]
+            raise ValueError(f"a Phong exponent must be finite and above -1, got {found:g}")
     integrals = [1 / (k + 1), 1 / (k + 2)]
     for l in range(2, degree + 1):
         integrals.append(integrals[-2] * (k - (l - 2)) / (k + (l + 1)))
@@ -86,13 +97,14 @@ def convolve(
     >>> round(float(irradiance[0, 0]), 3)
     3.142
     """
-    coefficients, zonal = as_float(coefficients), as_float(zonal)
-    degree = degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
+    coefficients, zonal = as_float(coefficients, "coefficients"), as_float(zonal, "zonal")
+    degree = check_coefficients("coefficients", coefficients)
     if zonal.ndim == 0 or zonal.shape[-1] != degree + 1:
         raise ValueError(
-            f"coefficients of degree {degree} need a kernel (..., {degree + 1}), one g_l per "
+            f"coefficients of degree {degree} need a zonal kernel (..., {degree + 1}), one g_l per "
             f"band, got shape {zonal.shape}"
         )
+    check_batches(coefficients=coefficients.shape, zonal=zonal.shape)
     lambdas = jnp.multiply(*align(zonal, _unit_lambdas(degree, zonal.dtype)))
     return jnp.multiply(
         *align(coefficients, lambdas[..., degrees(degree)].astype(coefficients.dtype))

@@ -4,8 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, is_concrete
+from .._core.checks import as_float, check_flag, check_number, check_size, check_type, is_concrete
 from ..transfer import Transfer
+from ..transfer._glossy_kernels import checked_albedo
 from ._result import Recovered
 
 
@@ -20,12 +21,23 @@ def check_data(
     Raises `ValueError` for shapes that do not fit, and, where values are known, for data that
     are not finite, all zero, or weighted by less than 0.
     """
+    check_type("transfer", transfer, Transfer)
     dtype, count = transfer.coefficients.dtype, len(transfer.coefficients)
-    observed, albedo = as_float(observed).astype(dtype), as_float(albedo).astype(dtype)
-    weights = jnp.ones(count, dtype) if weights is None else as_float(weights).astype(dtype)
-    _check_shapes(observed, albedo, weights, count)
+    observed = as_float(observed, "observed").astype(dtype)
+    albedo = checked_albedo(albedo, count, dtype)
+    weights = None if weights is None else as_float(weights, "weights").astype(dtype)
+    weights = jnp.ones(count, dtype) if weights is None else weights
+    _check_shapes(observed, weights, count)
     _check_values(observed, weights)
     return observed, albedo, weights
+
+
+def check_solver(tolerance: float | None, max_steps: int, throw: bool) -> None:
+    """Raises `ValueError` for options of a solver that are out of range."""
+    if tolerance is not None:
+        check_number("tolerance", tolerance, above=0.0)
+    check_size("max_steps", max_steps)
+    check_flag("throw", throw)
 
 
 def check_end(recovered: Recovered, what: str, *, throw: bool) -> None:
@@ -39,14 +51,9 @@ def check_end(recovered: Recovered, what: str, *, throw: bool) -> None:
         )
 
 
-def _check_shapes(observed: Array, albedo: Array, weights: Array, count: int) -> None:
+def _check_shapes(observed: Array, weights: Array, count: int) -> None:
     if observed.shape != (count, 3):
         raise ValueError(f"expected observed ({count}, 3), got shape {observed.shape}")
-    if albedo.shape not in ((), (3,), (count, 1), (count, 3)):
-        raise ValueError(
-            f"expected albedo as a number, (3,), ({count}, 1) or ({count}, 3), got shape "
-            f"{albedo.shape}"
-        )
     if weights.shape != (count,):
         raise ValueError(f"expected weights ({count},), got shape {weights.shape}")
 

@@ -16,10 +16,11 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
+from .._core.checks import check_all, check_number
 from .._core.linalg import matmul
 from ..midrange import Polygon
 from ..transfer import Transfer
-from ._checks import check_data, check_end
+from ._checks import check_data, check_end, check_solver
 from ._result import Confidence, Recovered, Statistics
 from ._shading import irradiance
 from ._solve import covariance, everywhere
@@ -81,10 +82,9 @@ def fit_colors(
     [3.0, 2.0, 1.0]
     """
     observed, albedo, weights = check_data(observed, transfer, albedo, weights)
-    if not lights:
-        raise ValueError("colors need at least one light")
-    if not upper > 0:
-        raise ValueError(f"the upper bound must be above 0, got {upper}")
+    check_solver(tolerance, max_steps, throw)
+    check_all("lights", lights, Polygon)
+    upper = check_number("upper", upper, above=0.0, infinite=True)
     default = max(1e-10, float(jnp.finfo(observed.dtype).eps))
     recovered = _fit(
         observed,

@@ -10,11 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import is_concrete
+from .._core.checks import check_all, check_flag, check_type, is_concrete
 from .._core.xla import on_mesh
 from ..midrange import Polygon
 from ..transfer import Transfer
-from ._checks import check_data, check_end
+from ._checks import check_data, check_end, check_solver
 from ._rectangle import Rectangle, moved, rectangle_of
 from ._result import Recovered, Statistics
 from ._shading import irradiance
@@ -83,6 +83,8 @@ def fit_polygons(
     [3.0, 2.0, 1.0]
     """
     observed, albedo, weights = check_data(observed, transfer, albedo, weights)
+    check_solver(tolerance, max_steps, throw)
+    turn = check_flag("turn", turn)
     guesses = _guesses(start, observed.dtype)
     default = max(1e-6, float(jnp.finfo(observed.dtype).eps) ** 0.5)
     recovered = _fit(
@@ -101,14 +103,19 @@ def fit_polygons(
 
 def _guesses(start, dtype) -> Rectangle:
     """Stacks the lights of all guesses in one `Rectangle`; leading axes are guess and light."""
+    check_type("start", start, list, tuple)
     single = all(isinstance(p, Polygon) for p in start)
-    guesses = [tuple(start)] if single else [tuple(guess) for guess in start]
+    guesses = [tuple(start)] if single else list(start)
+    for guess in guesses:
+        check_all("every guess in start", guess, Polygon)
     counts = {len(guess) for guess in guesses}
     if len(counts) != 1 or counts == {0}:
         raise ValueError(f"every guess needs the same number >= 1 of lights, got {sorted(counts)}")
     for polygon in (polygon for guess in guesses for polygon in guess):
         if is_concrete(polygon.radiance) and not (np.asarray(polygon.radiance) > 0).all():
-            raise ValueError(f"a guess needs positive radiance, got {polygon.radiance}")
+            raise ValueError(
+                f"a guess needs positive radiance, got {np.asarray(polygon.radiance).tolist()}"
+            )
     stacked = _stack([_stack([rectangle_of(p) for p in guess]) for guess in guesses])
     return jax.tree.map(lambda leaf: leaf.astype(dtype), stacked)
 

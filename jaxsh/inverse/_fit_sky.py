@@ -2,7 +2,6 @@
 
 import functools
 import math
-import operator
 from collections.abc import Callable
 
 import equinox as eqx
@@ -12,10 +11,11 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .. import sky as sky_room
+from .._core.checks import check_function, check_number, check_size, check_type, described
 from .._core.linalg import matmul
 from ..transfer import Transfer
 from ._charts import even_hemisphere, from_hemisphere, tangents, to_hemisphere, to_interval
-from ._checks import check_data, check_end
+from ._checks import check_data, check_end, check_solver
 from ._result import Confidence, Recovered, Statistics
 from ._shading import Shading, compress
 from ._solve import confidence, everywhere, levenberg_marquardt
@@ -113,13 +113,18 @@ def fit_sky(
     ([0.6, 0.0, 0.8], 3.0)
     """
     observed, albedo, weights = check_data(observed, transfer, albedo, weights)
-    low, high = turbidity
-    if not 0 < low < high < math.inf:
+    check_solver(tolerance, max_steps, throw)
+    check_type("turbidity", turbidity, tuple, list)
+    if len(turbidity) != 2:
+        raise ValueError(f"turbidity must be bounds (low, high), got {described(turbidity)}")
+    low, high = (check_number("a bound of turbidity", bound, above=0.0) for bound in turbidity)
+    if not low < high:
         raise ValueError(f"turbidity must be bounds 0 < low < high, got {turbidity}")
-    if exposure is not None and not 0 < exposure < math.inf:
-        raise ValueError(f"exposure must be positive, or None to recover it, got {exposure}")
-    if operator.index(starts) < 1:
-        raise ValueError(f"a fit needs at least 1 start, got {starts}")
+    if exposure is not None:
+        exposure = check_number("exposure", exposure, above=0.0)
+    starts = check_size("starts", starts)
+    if sky is not None:
+        check_function("sky", sky)
     if sky is None:
         sky = _preetham(min(transfer.degree, 6), low >= 2.5 and high <= 6)
     recovered = _fit(

@@ -4,6 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._core.checks import check_type
 from .._core.linalg import matmul
 from ..midrange import Polygon
 
@@ -57,6 +58,7 @@ def rectangle_of(polygon: Polygon) -> Rectangle:
     >>> lamp.center.tolist(), lamp.size.tolist()
     ([1.0, 1.5, 1.0], [3.0, 2.0])
     """
+    check_type("polygon", polygon, Polygon)
     v = polygon.vertices
     if v.shape != (4, 3):
         raise ValueError(f"a rectangle has 4 vertices, got a polygon of {len(v)}")

@@ -1,9 +1,12 @@
 """Argument checks: what is drawn is read to the host, and must be finite."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import ArrayLike, Float
+from matplotlib.axes import Axes
 
-from ..harmonics import degree_of
+from .._core.checks import as_host_float, check_all, check_coefficients, check_type
 
 POSITIVE = "#e07b39"
 NEGATIVE = "#3b7dd8"
@@ -12,9 +15,7 @@ CHANNELS = ("#d62728", "#2ca02c", "#1f77b4")  # R, G, B in matplotlib's own hues
 
 def read(name: str, values: ArrayLike) -> Float[np.ndarray, "..."]:
     """The values as a host array; raises `ValueError` where they are not finite real numbers."""
-    array = np.asarray(values)
-    if array.dtype.kind not in "fiu" and array.dtype.name != "bfloat16":
-        raise ValueError(f"{name} must be real numbers, got dtype {array.dtype}")
+    array = as_host_float(values, name)
     array = array.astype(array.dtype if array.dtype in (np.float32, np.float64) else np.float32)
     if not np.isfinite(array).all():
         count = np.count_nonzero(~np.isfinite(array))
@@ -22,12 +23,24 @@ def read(name: str, values: ArrayLike) -> Float[np.ndarray, "..."]:
     return array
 
 
+def check_labels(name: str, labels: Sequence[str] | None, count: int) -> None:
+    """Raises unless there are none, or one for each function."""
+    if labels is None:
+        return
+    check_all(name, labels, str, least=0)
+    if len(labels) != count:
+        raise ValueError(f"expected {count} {name}, one per function, got {len(labels)}")
+
+
+def check_axes(ax: Axes | None) -> None:
+    if ax is not None:
+        check_type("ax", ax, Axes)
+
+
 def read_coefficients(coefficients: ArrayLike) -> Float[np.ndarray, "..."]:
     """The coefficients as a host array, at least (K,), with K a square."""
     array = read("coefficients", coefficients)
-    if array.ndim == 0:
-        raise ValueError("coefficients must have shape (..., K), got a number")
-    degree_of(array.shape[-1])
+    check_coefficients("coefficients", array)
     if array.size == 0:
         raise ValueError(f"there is no function to draw in coefficients of shape {array.shape}")
     return array

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from ..harmonics import degree_of, degrees
-from ._arrays import CHANNELS, read_coefficients
+from ._arrays import CHANNELS, check_axes, check_labels, read_coefficients
 
 
 def bands(
@@ -45,8 +45,8 @@ def bands(
     values = read_coefficients(coefficients)
     functions = values.reshape(-1, values.shape[-1])
     colors: Sequence[str | None] = CHANNELS if values.shape[:-1] == (3,) else [None]
-    if labels is not None and len(labels) != len(functions):
-        raise ValueError(f"expected {len(functions)} labels, one per function, got {len(labels)}")
+    check_labels("labels", labels, len(functions))
+    check_axes(ax)
     if ax is None:
         from matplotlib import pyplot
 

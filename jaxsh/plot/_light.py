@@ -6,10 +6,11 @@ from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from .._core.checks import check_number, check_size
 from .._core.pictures import as_picture
 from ..imaging import auto_exposure, tone_map
 from ..sphere import reconstruct_lat_long
-from ._arrays import read, read_coefficients
+from ._arrays import check_axes, read, read_coefficients
 
 _MARK = "#ff00ff"
 _ROUNDING = 1e-6  # of the largest radiance: negative light below this is rounding
@@ -52,6 +53,10 @@ def light(
     >>> ax.get_legend().get_texts()[0].get_text()
     'negative: 40 % of the sphere, down to −1.2'
     """
+    check_axes(ax)
+    height = check_size("height", height)
+    if exposure is not None:
+        exposure = check_number("exposure", exposure, least=0.0)
     picture = _picture(light, height)
     shown = jnp.asarray(picture)
     if exposure is None:

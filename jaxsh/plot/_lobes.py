@@ -9,8 +9,9 @@ from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 
+from .._core.checks import check_flag, check_size
 from ..harmonics import degree_of, evaluate
-from ._arrays import NEGATIVE, POSITIVE, read_coefficients
+from ._arrays import NEGATIVE, POSITIVE, check_labels, read_coefficients
 
 _VIEW = {"elev": 22.0, "azim": 35.0}
 
@@ -55,8 +56,10 @@ def lobes(
     """
     values = read_coefficients(coefficients)
     functions = values.reshape(-1, values.shape[-1])
-    if titles is not None and len(titles) != len(functions):
-        raise ValueError(f"expected {len(functions)} titles, one per function, got {len(titles)}")
+    check_labels("titles", titles, len(functions))
+    same_scale = check_flag("same_scale", same_scale)
+    if resolution is not None:
+        resolution = check_size("resolution", resolution)
     axes = _axes(ax, values.shape[:-1])
     steps = resolution or max(48, 6 * degree_of(values.shape[-1]))
     theta, phi = np.meshgrid(

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float
+from .._core.checks import align, as_finite, check_vectors
 from .._core.xla import in_blocks, keep_batch, on_mesh
 from ..harmonics import degrees, orders
 
@@ -41,15 +41,14 @@ def angles(view: Float[Array, "*views 3"], sun: Float[Array, "*suns 3"]) -> Angl
 
 def directions(value: Float[ArrayLike, "*batch 3"], name: str) -> Float[Array, "*batch 3"]:
     """Converts to floating point; raises `ValueError` that names an input of wrong shape."""
-    array = as_float(value)
-    if array.ndim == 0 or array.shape[-1] != 3:
-        raise ValueError(f"expected {name} (..., 3) with x, y, z last, got shape {array.shape}")
+    array = as_finite(value, name)
+    check_vectors(name, array)
     return array
 
 
-def parameter(value: Float[ArrayLike, "*batch"], dtype) -> Float[Array, "*batch"]:
+def parameter(value: Float[ArrayLike, "*batch"], dtype, name: str) -> Float[Array, "*batch"]:
     """Converts a model's number, one per sun, to the directions' dtype."""
-    return as_float(value).astype(dtype)
+    return as_finite(value, name).astype(dtype)
 
 
 def each_sun(

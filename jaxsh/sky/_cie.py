@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, check_batches
+from .._core.checks import align, check_batches, described
 from ._angles import angles, directions, parameter
 from ._preetham import gradation
 from ._validity import Check, check_option, check_sun
@@ -69,7 +69,7 @@ def cie_radiance(
     row = _coefficients(kind)
     check_option(check)
     view, sun = directions(view, "view"), directions(sun, "sun")
-    zenith = parameter(zenith_luminance, jnp.result_type(view, sun))
+    zenith = parameter(zenith_luminance, jnp.result_type(view, sun), "zenith_luminance")
     check_batches(view=view.shape, sun=sun.shape, zenith_luminance=(*zenith.shape, 1))
     check_sun(sun, check)
     return _radiance(view, sun, zenith, jnp.asarray(row, zenith.dtype))
@@ -95,6 +95,6 @@ def _coefficients(kind: int) -> tuple[float, ...]:
         number = operator.index(kind)
     except TypeError:
         number = 0
-    if not 1 <= number <= len(_TYPES):
-        raise ValueError(f"kind must be an integer from 1 to {len(_TYPES)}, got {kind!r}")
+    if not 1 <= number <= len(_TYPES) or isinstance(kind, bool):
+        raise ValueError(f"kind must be an integer from 1 to {len(_TYPES)}, got {described(kind)}")
     return _TYPES[number - 1]

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._core.checks import check_choice
 from .._core.host import read_only_cache
 
 Space = Literal["srgb", "xyz", "xyY"]
@@ -61,8 +62,7 @@ def from_xyz(
 
 
 def check_space(space: str) -> None:
-    if space not in get_args(Space):
-        raise ValueError(f"space must be one of {', '.join(get_args(Space))}, got {space!r}")
+    check_choice("space", space, get_args(Space))
 
 
 def _xyz_at_unit_sum(chromaticity: Float[np.ndarray, "*batch 2"]) -> Float[np.ndarray, "*batch 3"]:

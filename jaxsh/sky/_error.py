@@ -8,7 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_batches, check_degree
+from .._core.checks import (
+    align,
+    as_float,
+    check_batches,
+    check_choice,
+    check_coefficients,
+    check_degree,
+)
 from .._core.host import read_only_cache
 from .._core.linalg import matmul
 from ..sphere import reconstruct
@@ -49,7 +56,7 @@ def fit_error(
 
     The 2-norm and the 1-norm of the coefficients' error over L_min, `smallest`, which broadcasts
     against the leading axes. For fewer bands pass fewer coefficients. Differentiable, but for the
-    2-norm where the error is zero.
+    2-norm where the error is zero. Raises `ValueError` for shapes that do not fit.
 
     **Example**
 
@@ -61,8 +68,16 @@ def fit_error(
     >>> bool(100 * error.mean.max() < 0.005)
     True
     """
-    difference = jnp.subtract(*align(as_float(approximate), as_float(exact)))
-    low = as_float(smallest)
+    approximate, exact = as_float(approximate, "approximate"), as_float(exact, "exact")
+    low = as_float(smallest, "smallest")
+    check_coefficients("approximate", approximate)
+    if approximate.shape[-1:] != exact.shape[-1:]:
+        raise ValueError(
+            f"expected approximate and exact of one degree, got shapes {approximate.shape} and "
+            f"{exact.shape}"
+        )
+    check_batches(approximate=approximate.shape, exact=exact.shape, smallest=(*low.shape, 1))
+    difference = jnp.subtract(*align(approximate, exact))
     mean, largest = jnp.linalg.norm(difference, axis=-1), jnp.sum(jnp.abs(difference), axis=-1)
     return FitError(*(jnp.divide(*align(value, low)) for value in (mean, largest)))
 
@@ -96,10 +111,9 @@ def smallest_luminance(
     >>> sky.smallest_luminance(np.array([0.6, 0.0, 0.8]), 3.0).shape
     (3,)
     """
-    if reading not in get_args(Reading):
-        raise ValueError(f"reading must be one of {', '.join(get_args(Reading))}, got {reading!r}")
+    check_choice("reading", reading, get_args(Reading))
     sun = directions(sun, "sun")
-    turbidity = parameter(turbidity, sun.dtype)
+    turbidity = parameter(turbidity, sun.dtype, "turbidity")
     check_batches(sun=sun.shape, turbidity=(*turbidity.shape, 1))
     return _smallest(sun, turbidity, reading, check_degree(degree))
 

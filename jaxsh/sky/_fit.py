@@ -8,13 +8,25 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import check_degree
+from .._core.checks import (
+    as_finite,
+    check_degree,
+    check_flag,
+    check_function,
+    check_number,
+    check_size,
+    check_type,
+    described,
+)
 from .._core.linalg import einsum, matmul
 from ..harmonics import orders
 from ._angles import half_rows
 from ._project import Model, project
 from ._sky_fit import Axis, Prefactor, SkyFit, design, monomials
 from ._solve import Solution, Solver, least_squares
+
+# Those that the named fits pass on.
+OPTIONS = ("zenith", "weight", "lawson", "samples", "project", "solver", "max_steps", "throw")
 
 
 def fit(
@@ -76,6 +88,13 @@ def fit(
     >>> fitted(np.array([0.6, 0.0, 0.8]), 1.5).shape
     (1, 4)
     """
+    check_function("model", model)
+    check_function("project", project)
+    for name, function in (("prefactor", prefactor), ("weight", weight)):
+        if function is not None:
+            check_function(name, function)
+    parity, throw = check_flag("parity", parity), check_flag("throw", throw)
+    lawson, max_steps = check_size("lawson", lawson, 0), check_size("max_steps", max_steps)
     axes = _axes(parameters, log, zenith, parity)
     terms = _counts("terms", terms, [12, *[6] * len(parameters)])
     samples = _counts("samples", samples, [2 * count + 4 for count in terms])
@@ -91,7 +110,9 @@ def fit(
     exact = project(model, suns, *numbers, degree=degree, symmetric=True)
     _check_finite(exact, theta, numbers)
     channels = exact.shape[-2]
-    mix = jnp.eye(channels) if mix is None else jnp.asarray(mix, exact.dtype)
+    mix = jnp.eye(channels) if mix is None else as_finite(mix, "mix").astype(exact.dtype)
+    if mix.shape != (channels, channels):
+        raise ValueError(f"expected mix ({channels}, {channels}), got shape {mix.shape}")
     rows = half_rows(degree)
     targets = jnp.einsum("qc,scr->qrs", jnp.linalg.inv(mix), exact[..., rows])
 
@@ -136,12 +157,20 @@ def _solve(columns, targets, scales, weights, *, solver, max_steps):
 
 
 def _axes(parameters, log, zenith: float, parity: bool) -> tuple[Axis, ...]:
+    check_type("parameters", parameters, Mapping)
+    check_type("log", log, list, tuple, set)
     unknown = set(log) - set(parameters)
     if unknown:
-        raise ValueError(f"log names no parameter: {', '.join(sorted(unknown))}")
-    if not 0 < zenith < math.pi:
-        raise ValueError(f"zenith must be an angle in (0, π), got {zenith}")
-    for name, (low, high) in parameters.items():
+        raise ValueError(f"log names no parameter: {', '.join(sorted(map(str, unknown)))}")
+    zenith = check_number("zenith", zenith, above=0.0)
+    if not zenith < math.pi:
+        raise ValueError(f"zenith must be an angle in (0, π), got {zenith:g}")
+    for name, bounds in parameters.items():
+        if not isinstance(bounds, tuple | list) or len(bounds) != 2:
+            raise ValueError(
+                f"expected the range of {name} as (low, high), got {described(bounds)}"
+            )
+        low, high = (check_number(f"the range of {name}", one, infinite=True) for one in bounds)
         if not (math.isfinite(low) and low < high < math.inf) or (name in log and low <= 0):
             wanted = "0 < low < high" if name in log else "low < high"
             raise ValueError(f"the range of {name} must be {wanted}, got ({low}, {high})")
@@ -151,12 +180,13 @@ def _axes(parameters, log, zenith: float, parity: bool) -> tuple[Axis, ...]:
 
 
 def _counts(name: str, counts, default: list[int]) -> tuple[int, ...]:
-    counts = tuple(default if counts is None else counts)
-    if len(counts) != len(default) or min(counts) < 1:
+    counts = default if counts is None else counts
+    if not isinstance(counts, list | tuple) or len(counts) != len(default):
         raise ValueError(
-            f"expected {len(default)} positive {name}, for the sun and each parameter, got {counts}"
+            f"expected {len(default)} positive {name}, for the sun and each parameter, got "
+            f"{counts if isinstance(counts, list | tuple) else described(counts)}"
         )
-    return counts
+    return tuple(check_size(name, count) for count in counts)
 
 
 def _check_symmetry(model: Model, suns, numbers) -> None:

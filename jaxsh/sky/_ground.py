@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_batches, is_concrete
+from .._core.checks import align, as_finite, check_batches, check_coefficients, is_concrete
 from ..harmonics import degree_of, index, num_coefficients
 
 
@@ -27,9 +27,8 @@ def horizontal_irradiance(
     >>> sky.horizontal_irradiance(light).shape
     (3,)
     """
-    coefficients = as_float(coefficients)
-    if degree_of(coefficients.shape[-1] if coefficients.ndim else 0) < 1:
-        raise ValueError("irradiance needs a light of degree 1 or more, got degree 0")
+    coefficients = as_finite(coefficients, "coefficients")
+    _check_degree("coefficients", coefficients)
     return math.sqrt(4 * math.pi / 3) * coefficients[..., index(1, 0)]
 
 
@@ -55,17 +54,23 @@ def with_ground(
     >>> sky.with_ground(light, np.array([0.3, 0.2, 0.1])).shape
     (3, 4)
     """
-    light = as_float(light)
-    irradiance = horizontal_irradiance(light)
+    light = as_finite(light, "light")
+    _check_degree("light", light)
     if light.ndim < 2:
-        raise ValueError(f"expected a light (..., channels, K), got shape {light.shape}")
-    albedo = as_float(albedo).astype(light.dtype)
-    if is_concrete(albedo) and not np.all((np.asarray(albedo) >= 0) & (np.asarray(albedo) <= 1)):
-        raise ValueError(f"albedo must be in [0, 1], got {albedo}")
+        raise ValueError(f"expected light (..., channels, K), got shape {light.shape}")
+    irradiance = horizontal_irradiance(light)
+    albedo = as_finite(albedo, "albedo", least=0.0).astype(light.dtype)
+    if is_concrete(albedo) and (np.asarray(albedo) > 1).any():
+        raise ValueError(f"albedo must be in [0, 1], got {np.asarray(albedo).max():g}")
     check_batches(light=light.shape, albedo=(*albedo.shape, 1))
     radiance = jnp.multiply(*align(irradiance, albedo))[..., None] / math.pi
     step = jnp.asarray(_lower_hemisphere(light.shape[-1]), light.dtype)
     return jnp.add(*align(light, jnp.multiply(*align(radiance, step))))
+
+
+def _check_degree(name: str, light: Array) -> None:
+    if check_coefficients(name, light) < 1:
+        raise ValueError(f"irradiance needs {name} of degree 1 or more, got degree 0")
 
 
 def _lower_hemisphere(count: int) -> Float[np.ndarray, " k"]:

@@ -7,8 +7,9 @@ from fractions import Fraction
 import numpy as np
 from jaxtyping import Float
 
+from .._core.checks import as_host_float, check_coefficients, check_options, check_type
 from ._angles import half_rows
-from ._fit import fit
+from ._fit import OPTIONS, fit
 from ._preetham import Constants, preetham_constants, preetham_radiance
 from ._sky_fit import Axis, SkyFit
 
@@ -39,6 +40,9 @@ def habel2008_fit(
     >>> sky.habel2008_monomials(fitted).shape
     (4, 4, 3, 3)
     """
+    preetham_constants(constants)
+    check_type("terms", terms, tuple, list)
+    check_options("habel2008_fit", options, OPTIONS)
     return fit(
         _model(constants),
         {"turbidity": turbidity},
@@ -67,6 +71,7 @@ def habel2008_monomials(fit: SkyFit) -> Float[np.ndarray, "k i j channels"]:
     >>> table.shape, bool((table[1] == 0).all())
     ((4, 4, 3, 3), True)
     """
+    check_type("fit", fit, SkyFit)
     if fit.parity or fit.prefactor is not None or any(axis.log for axis in fit.axes):
         raise ValueError("only a plain fit in θ and τ is a polynomial: see habel2008_fit")
     if len(fit.axes) != 2:
@@ -103,6 +108,17 @@ def habel2008_evaluate(
     >>> sky.habel2008_evaluate(table, np.array([0.2, 0.9]), np.array([3.0, 4.0])).shape
     (2, 3, 4)
     """
+    table = as_host_float(table, "table")
+    if table.ndim != 4:
+        raise ValueError(
+            f"expected table (K, terms in θ, terms in τ, channels), got shape {table.shape}"
+        )
+    check_coefficients("table.T", table.T)
+    theta, turbidity = as_host_float(theta, "theta"), as_host_float(turbidity, "turbidity")
+    if theta.ndim != 1 or theta.shape != turbidity.shape:
+        raise ValueError(
+            f"expected theta and turbidity (n,), got shapes {theta.shape} and {turbidity.shape}"
+        )
     powers = (
         np.power.outer(np.asarray(x, table.dtype), np.arange(count, dtype=table.dtype))
         for x, count in zip((theta, turbidity), table.shape[1:3], strict=True)
@@ -130,7 +146,6 @@ def _integers(fractions: np.ndarray) -> tuple[np.ndarray, int]:
 
 @functools.cache
 def _model(constants: Constants):
-    preetham_constants(constants)
     return functools.partial(preetham_radiance, constants=constants, check="allow")
 
 
@@ -190,6 +205,8 @@ def c_header(fit: SkyFit, prefix: str = "sky_harmonics") -> str:
     >>> "static void my_sky(double theta, double phi, double turbidity," in header
     True
     """
+    check_type("fit", fit, SkyFit)
+    check_type("prefix", prefix, str)
     if not (prefix.isidentifier() and prefix.isascii()):
         raise ValueError(f"prefix must be a name in C, got {prefix!r}")
     table = np.moveaxis(habel2008_monomials(fit)[half_rows(fit.degree)], -1, 1)

@@ -68,7 +68,7 @@ def hosek_radiance(
     check_option(check)
     view, sun = directions(view, "view"), directions(sun, "sun")
     dtype = jnp.result_type(view, sun)
-    turbidity, albedo = parameter(turbidity, dtype), parameter(albedo, dtype)
+    turbidity, albedo = parameter(turbidity, dtype, "turbidity"), parameter(albedo, dtype, "albedo")
     check_batches(
         view=view.shape, sun=sun.shape, turbidity=(*turbidity.shape, 1), albedo=(*albedo.shape, 1)
     )

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, check_batches
+from .._core.checks import align, check_batches, check_choice
 from ._angles import Angles, angles, directions, parameter
 from ._color import Space, check_space, from_xyy
 from ._validity import Check, check_luminance, check_option, check_sun, check_turbidity
@@ -119,8 +119,7 @@ def preetham_constants(name: str) -> PreethamConstants:
     >>> [sky.preetham_constants(name).zenith_x[2][3] for name in ("paper", "code")]
     [0.25886, 0.25885]
     """
-    if name not in get_args(Constants):
-        raise ValueError(f"constants must be one of {', '.join(get_args(Constants))}, got {name!r}")
+    check_choice("name of constants", name, get_args(Constants))
     return _PAPER if name == "paper" else _CODE
 
 
@@ -172,7 +171,7 @@ def preetham_radiance(
     check_space(space)
     check_option(check)
     view, sun = directions(view, "view"), directions(sun, "sun")
-    turbidity = parameter(turbidity, jnp.result_type(view, sun))
+    turbidity = parameter(turbidity, jnp.result_type(view, sun), "turbidity")
     check_batches(view=view.shape, sun=sun.shape, turbidity=(*turbidity.shape, 1))
     check_turbidity(turbidity, check)
     check_sun(sun, check)

@@ -10,13 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import check_batches, check_degree
+from .._core.checks import check_batches, check_choice, check_degree, check_options, check_type
 from .._core.host import read_only_cache
 from ..harmonics import window as harmonics_window
 from ._angles import directions, parameter, zenith_angle
 from ._color import xyz_to_srgb
 from ._error import smallest_luminance
-from ._fit import fit
+from ._fit import OPTIONS, fit
 from ._preetham import (
     gradation,
     indicatrix,
@@ -82,11 +82,11 @@ def preetham_harmonics(
     (2, 3, 25)
     """
     sun = directions(sun, "sun")
-    turbidity = parameter(turbidity, sun.dtype)
+    turbidity = parameter(turbidity, sun.dtype, "turbidity")
     if table is None:
         table = "precise" if sun.dtype == jnp.float64 else "small"
-    if window is not None and window not in _KINDS:
-        raise ValueError(f"window must be one of {', '.join(_KINDS)} or None, got {window!r}")
+    if window is not None:
+        check_choice("window", window, _KINDS)
     degree = check_degree(degree)
     check_batches(sun=sun.shape, turbidity=(*turbidity.shape, 1))
     check_range(stored_axes(table), True, sun, (turbidity,))
@@ -124,8 +124,7 @@ def preetham_table(table: Table, degree: int = 6) -> SkyFit:
 
 
 def stored_axes(table: Table) -> tuple[Axis, ...]:
-    if table not in get_args(Table):
-        raise ValueError(f"table must be one of {', '.join(get_args(Table))}, got {table!r}")
+    check_choice("table", table, get_args(Table))
     return preetham_axes(*_stored()[table][1])
 
 
@@ -180,6 +179,8 @@ def preetham_fit(
     >>> fitted(np.array([0.6, 0.0, 0.8]), 3.5).shape
     (3, 4)
     """
+    check_type("terms", terms, tuple, list)
+    check_options("preetham_fit", options, OPTIONS)
     return fit(
         _MODEL,
         {"turbidity": turbidity},

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_batches, check_degree
+from .._core.checks import check_batches, check_degree, check_flag, check_function
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
 from ..harmonics import degrees, evaluate, orders, rotate_z
@@ -69,8 +69,9 @@ def project(
     >>> sky.project(glow, np.array([0.6, 0.0, 0.8]), 1.5, degree=1, symmetric=True).shape
     (1, 4)
     """
-    sun = directions(sun, "sun")
-    numbers = tuple(parameter(p, sun.dtype) for p in parameters)
+    check_function("model", model)
+    symmetric, sun = check_flag("symmetric", symmetric), directions(sun, "sun")
+    numbers = tuple(parameter(p, sun.dtype, f"parameter {i + 1}") for i, p in enumerate(parameters))
     shapes = {f"parameter {i + 1}": (*p.shape, 1) for i, p in enumerate(numbers)}
     check_batches(sun=sun.shape, **shapes)
     return _project(sun, numbers, model, check_degree(degree), symmetric)
@@ -105,7 +106,8 @@ def project_preetham(
     check_space(space)
     check_option(check)
     sun = directions(sun, "sun")
-    turbidity = as_float(turbidity)
+    turbidity = parameter(turbidity, sun.dtype, "turbidity")
+    check_batches(sun=sun.shape, turbidity=(*turbidity.shape, 1))
     check_turbidity(turbidity, check)
     check_sun(sun, check)
     model = _preetham(constants, space)

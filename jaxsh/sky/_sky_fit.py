@@ -112,7 +112,10 @@ class SkyFit(eqx.Module):
         if len(parameters) != len(self.axes) - 1:
             names = ", ".join(axis.name for axis in self.axes[1:]) or "none"
             raise ValueError(f"expected as parameters {names}, got {len(parameters)}")
-        numbers = tuple(parameter(value, sun.dtype) for value in parameters)
+        numbers = tuple(
+            parameter(value, sun.dtype, axis.name)
+            for axis, value in zip(self.axes[1:], parameters, strict=True)
+        )
         shapes = {
             axis.name: (*value.shape, 1) for axis, value in zip(self.axes[1:], numbers, strict=True)
         }

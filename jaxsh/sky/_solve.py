@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from .._core.checks import as_finite, check_size, described, nearest
 from .._core.linalg import matmul
 
 _Named = Literal["gauss-newton", "levenberg-marquardt", "qr"]
@@ -79,6 +80,16 @@ def least_squares(
     """
     import optimistix as optx
 
+    max_steps = check_size("max_steps", max_steps)
+    design, targets = as_finite(design, "design"), as_finite(targets, "targets")
+    scales = as_finite(scales, "scales")
+    if design.ndim != 2:
+        raise ValueError(f"expected design (samples, terms), got shape {design.shape}")
+    if targets.ndim != 2 or targets.shape[1] != len(design) or scales.shape != targets.shape:
+        raise ValueError(
+            f"expected targets and scales (problems, {len(design)}), got shapes {targets.shape} "
+            f"and {scales.shape}"
+        )
     values, steps, results = _solve(
         design, targets, scales, _named(solver, design.dtype), max_steps
     )
@@ -103,7 +114,10 @@ def _named(solver: Solver, dtype):
         case "qr" | optx.AbstractLeastSquaresSolver():
             return solver
     names = ", ".join(get_args(_Named))
-    raise ValueError(f"solver must be one of {names} or of Optimistix, got {solver!r}")
+    raise ValueError(
+        f"solver must be one of {names} or of Optimistix, got {described(solver)}"
+        f"{nearest(solver, get_args(_Named))}"
+    )
 
 
 @eqx.filter_jit

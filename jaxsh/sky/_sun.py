@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, check_batches, check_degree
+from .._core.checks import align, check_batches, check_degree, check_number
 from .._core.host import read_only_cache
 from .._core.linalg import matmul
 from ..harmonics import degrees, evaluate
@@ -57,7 +57,7 @@ def sun_radiance(
     check_space(space)
     check_option(check)
     sun = directions(sun, "sun")
-    turbidity = parameter(turbidity, sun.dtype)
+    turbidity = parameter(turbidity, sun.dtype, "turbidity")
     check_batches(sun=sun.shape, turbidity=(*turbidity.shape, 1))
     check_turbidity(turbidity, check)
     check_sun(sun, check)
@@ -90,8 +90,7 @@ def sun_harmonics(
     (3, 25)
     """
     degree = check_degree(degree)
-    if not 0 < radius <= math.pi:
-        raise ValueError(f"radius must be in (0, π] radians, got {radius}")
+    radius = check_number("radius", radius, above=0.0, most=math.pi)
     radiance = sun_radiance(sun, turbidity, space=space, check=check)
     basis = evaluate(directions(sun, "sun"), degree)
     basis, lambdas = align(basis, jnp.asarray(disc_lambdas(radius, degree), basis.dtype))

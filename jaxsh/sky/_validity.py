@@ -6,7 +6,7 @@ from typing import Literal, get_args
 import numpy as np
 from jaxtyping import Array
 
-from .._core.checks import is_concrete
+from .._core.checks import check_choice, is_concrete
 
 Check = Literal["raise", "warn", "allow"]
 
@@ -50,7 +50,10 @@ def check_sun(sun: Array, check: Check) -> None:
     if check == "allow" or not is_concrete(sun):
         return
     vectors = np.asarray(sun, np.float64)
-    sine = vectors[..., 2] / np.linalg.norm(vectors, axis=-1)
+    length = np.linalg.norm(vectors, axis=-1)
+    if not length.all():
+        raise ValueError("expected sun as a direction, got a vector of length 0")
+    sine = vectors[..., 2] / length
     bad = ~(sine >= -_ROUNDING)
     if bad.any():
         elevation = np.degrees(np.arcsin(sine[bad].flat[0]))
@@ -69,8 +72,7 @@ def check_luminance(luminance: Array, check: Check) -> None:
 
 
 def check_option(check: str) -> None:
-    if check not in get_args(Check):
-        raise ValueError(f"check must be one of {', '.join(get_args(Check))}, got {check!r}")
+    check_choice("check", check, get_args(Check))
 
 
 def _say(what: str, check: Check) -> None:

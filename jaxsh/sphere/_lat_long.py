@@ -10,7 +10,7 @@ import jax
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_degree, check_size
+from .._core.checks import as_float, check_coefficients, check_degree, check_size
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
 from .._core.pictures import as_radiance, check_result, check_shape
@@ -50,7 +50,7 @@ def project_lat_long(image: Float[ArrayLike, "h w c"], degree: int) -> Float[Arr
     height, width, _ = image.shape
     if min(height, width) <= 2 * degree:
         raise ValueError(
-            f"a lat-long picture of {height} rows and {width} columns is too small for degree "
+            f"image of {height} rows and {width} columns is too small for degree "
             f"{degree}: both must be above {2 * degree}"
         )
     coefficients = _project(image, degree)
@@ -73,9 +73,10 @@ def reconstruct_lat_long(
     >>> sphere.reconstruct_lat_long(jnp.zeros((3, 9)), height=4, width=8).shape
     (4, 8, 3)
     """
-    coefficients = as_float(coefficients)
+    coefficients = as_float(coefficients, "coefficients")
     if coefficients.ndim != 2:
         raise ValueError(f"expected coefficients (channels, K), got shape {coefficients.shape}")
+    check_coefficients("coefficients", coefficients)
     height, width = check_size("height", height), check_size("width", width)
     return _reconstruct(coefficients, height, width)
 

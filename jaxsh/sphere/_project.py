@@ -11,7 +11,16 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_degree, flatten_batch
+from .._core.checks import (
+    align,
+    as_finite,
+    as_float,
+    check_coefficients,
+    check_degree,
+    check_type,
+    check_vectors,
+    flatten_batch,
+)
 from .._core.linalg import einsum, matmul
 from .._core.xla import in_blocks, keep_rows, on_mesh
 from ..harmonics import clamped_cosine, convolve, degree_of, evaluate
@@ -49,7 +58,8 @@ def project(
     >>> round(float(c[2]), 3)  # √(4π/3)
     2.047
     """
-    values = as_float(values)
+    values = as_float(values, "values")
+    check_type("quadrature", quadrature, Quadrature)
     count = len(quadrature.weights)
     if values.ndim == 0 or values.shape[-1] != count:
         raise ValueError(
@@ -80,10 +90,11 @@ def reconstruct(
     >>> sphere.reconstruct(c, sphere.fibonacci(5).directions).shape
     (3, 5)
     """
-    coefficients, directions = as_float(coefficients), as_float(directions)
+    coefficients = as_float(coefficients, "coefficients")
+    directions = as_float(directions, "directions")
     if directions.ndim != 2 or directions.shape[-1] != 3:
         raise ValueError(f"expected directions (N, 3), got shape {directions.shape}")
-    degree_of(coefficients.shape[-1] if coefficients.ndim else 0)
+    check_coefficients("coefficients", coefficients)
     return _reconstruct(coefficients, directions)
 
 
@@ -107,7 +118,8 @@ def irradiance(
     diffuse surface leaves albedo/π times it. Linear in the light; differentiable in both to every
     order, forward and reverse, with the gradient in a normal tangential to it. A zero normal gives
     NaN. A light that rings may give values below zero: see `harmonics.dering`. Raises `ValueError`
-    where K is not a square, the normals have no three components or leading axes do not broadcast.
+    where K is not a square, the normals have no three components or leading axes do not broadcast,
+    and for a light that is at hand and not finite (`docs/conventions.md`).
 
     **Example**
 
@@ -118,10 +130,9 @@ def irradiance(
     >>> E.shape, round(float(E[1, 0]), 3)
     ((2, 3), 3.142)
     """
-    light, normals = as_float(light), as_float(normals)
-    if normals.ndim == 0 or normals.shape[-1] != 3:
-        raise ValueError(f"expected normals (..., 3) with x, y, z last, got shape {normals.shape}")
-    degree_of(light.shape[-1] if light.ndim else 0)
+    light, normals = as_finite(light, "light"), as_float(normals, "normals")
+    check_vectors("normals", normals)
+    check_coefficients("light", light)
     if light.ndim == 1:
         return _irradiance(light[None], normals)[..., 0]
     try:

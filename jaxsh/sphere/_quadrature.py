@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._core.checks import check_size
+from .._core.checks import as_float, check_size
 from ..harmonics._tables import exact_grid
 
 
@@ -27,8 +27,8 @@ class Quadrature(eqx.Module):
     12.57
     """
 
-    directions: Float[Array, "n 3"] = eqx.field(converter=jnp.asarray)
-    weights: Float[Array, " n"] = eqx.field(converter=jnp.asarray)
+    directions: Float[Array, "n 3"] = eqx.field(converter=lambda v: as_float(v, "directions"))
+    weights: Float[Array, " n"] = eqx.field(converter=lambda v: as_float(v, "weights"))
 
     def __check_init__(self):
         if self.weights.ndim != 1 or self.directions.shape != (*self.weights.shape, 3):

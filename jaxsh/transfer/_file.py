@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._core.checks import as_path, check_type
 from .._core.npy import from_npy
 from .._core.words import reason
 from ..harmonics import degree_of
@@ -36,7 +37,8 @@ def save(path: str | os.PathLike[str], transfer: Transfer) -> Path:
     ...     transfer.load(path).coefficients.shape
     (300, 4)
     """
-    path = Path(path)
+    path = as_path(path)
+    check_type("transfer", transfer, Transfer)
     arrays = {name: np.asarray(getattr(transfer, name)) for name in _FIELDS}
     if problem := _problem(arrays):
         raise ValueError(f"{path}: cannot be written: {problem}")
@@ -69,7 +71,7 @@ def load(path: str | os.PathLike[str]) -> Transfer:
     ...     bool((transfer.load(path).coefficients == baked.coefficients).all())
     True
     """
-    path = Path(path)
+    path = as_path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such transfer file")
     if not zipfile.is_zipfile(path):

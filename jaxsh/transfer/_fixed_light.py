@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align
+from .._core.checks import align, check_flag, check_type
 from .._core.linalg import matmul
 from .._core.xla import on_mesh
 from ..harmonics import convolve, degree_of, evaluate, num_coefficients, phong, product_matrix
@@ -57,6 +57,7 @@ class FixedLight(eqx.Module):
 
         Arguments, derivatives and errors as for `shade_glossy`.
         """
+        distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
         count, dtype = self.irradiance.shape[0], self.irradiance.dtype
         eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
         return _shade(self, eye, material, distant, normalized)
@@ -83,6 +84,7 @@ def fixed_light(light: Float[ArrayLike, "3 k"], transfer: Transfer) -> FixedLigh
     >>> still(jnp.asarray([0.0, 0.0, 5.0]), transfer.Material(0.5, 0.5, 8.0)).shape
     (1, 3)
     """
+    check_type("transfer", transfer, Transfer)
     light = checked_one_light(light, transfer.num_points, transfer.degree, transfer.dtype)
     return _fixed_light(light, transfer)
 

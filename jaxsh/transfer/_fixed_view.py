@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float
+from .._core.checks import as_finite, check_flag, check_type
 from .._core.linalg import tall_product
 from ..harmonics import degree_of, num_coefficients
 from ._glossy_kernels import lobe_polynomial, lobe_products
@@ -44,9 +44,10 @@ class FixedView(eqx.Module):
 
         `light` (..., 3, K) is of the view's degree, since `shade_glossy` cuts every function to
         the light's. All vertices share it: axes in front are a batch of lights, and none of them
-        stands for the vertices. Bilinear and differentiable. Raises `ValueError` for other shapes.
+        stands for the vertices. Bilinear and differentiable. Raises `ValueError` for other shapes,
+        and for a light that is at hand and not finite.
         """
-        light, width = as_float(light), self.coefficients.shape[-1]
+        light, width = as_finite(light, "light"), self.coefficients.shape[-1]
         if light.shape[-2:] != (3, width):
             raise ValueError(
                 f"expected light (..., 3, {width}), of the view's degree {self.degree}, got "
@@ -91,6 +92,8 @@ def fixed_view(
     >>> view(jnp.ones((3, 4))).shape
     (1, 3)
     """
+    check_type("transfer", transfer, Transfer)
+    distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
     count, dtype = transfer.num_points, transfer.dtype
     eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
     degree = checked_degree(transfer, degree)

@@ -18,11 +18,18 @@ from .._core.vectors import normalize
 from .._core.xla import materialize, on_mesh
 from ..harmonics import degree_of, legendre, orders, phong
 from ..harmonics._tables import exact_grid
-from ._material import checked_eye, checked_light, checked_material, checked_one_light
+from ._material import (
+    checked_albedo,
+    checked_eye,
+    checked_light,
+    checked_material,
+    checked_one_light,
+)
 
 __all__ = [
     "AtNodes",
     "block_sums",
+    "checked_albedo",
     "checked_eye",
     "checked_light",
     "checked_material",

@@ -5,14 +5,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, is_concrete
+from .._core.checks import as_finite, check_type, is_concrete
 from ..harmonics import degree_of
 
 
-def _as_strong(value: ArrayLike) -> Float[Array, "..."]:
-    """Gives a type of its own, so that numbers and arrays run the same compiled programs."""
-    array = as_float(value)
-    return array.astype(array.dtype)
+def _as_strong(name: str, least: float | None):
+    """Converts to a type of its own, so that numbers and arrays run the same compiled programs."""
+
+    def convert(value: ArrayLike) -> Float[Array, "..."]:
+        array = as_finite(value, name, least=least, wait=True)
+        return array.astype(array.dtype)
+
+    return convert
 
 
 class Material(eqx.Module):
@@ -34,9 +38,9 @@ class Material(eqx.Module):
     ((3,), ())
     """
 
-    diffuse: Float[Array, "..."] = eqx.field(converter=_as_strong)
-    specular: Float[Array, "..."] = eqx.field(converter=_as_strong)
-    exponent: Float[Array, "..."] = eqx.field(converter=_as_strong)
+    diffuse: Float[Array, "..."] = eqx.field(converter=_as_strong("diffuse", 0.0))
+    specular: Float[Array, "..."] = eqx.field(converter=_as_strong("specular", 0.0))
+    exponent: Float[Array, "..."] = eqx.field(converter=_as_strong("exponent", None))
 
     def __check_init__(self):
         for name in ("diffuse", "specular"):
@@ -47,14 +51,12 @@ class Material(eqx.Module):
                 raise ValueError(
                     f"expected {name} as a number, (3,), (V, 1) or (V, 3), got shape {array.shape}"
                 )
-            if is_concrete(array) and not (np.isfinite(array) & (np.asarray(array) >= 0)).all():
-                raise ValueError(f"{name} must be finite and >= 0 everywhere")
         if self.exponent.ndim > 1:
-            raise ValueError(f"expected exponent as a number or (V,), got {self.exponent.shape}")
-        if is_concrete(self.exponent):
-            exponent = np.asarray(self.exponent)
-            if not (np.isfinite(exponent) & (exponent > -1)).all():
-                raise ValueError("exponent must be finite and above -1 everywhere")
+            raise ValueError(
+                f"expected exponent as a number or (V,), got shape {self.exponent.shape}"
+            )
+        if is_concrete(self.exponent) and not (np.asarray(self.exponent) > -1).all():
+            raise ValueError("exponent must be finite and above -1 everywhere")
         counts = {
             name: len(array)
             for name, array, ndim in (
@@ -71,8 +73,11 @@ class Material(eqx.Module):
 def checked_light(
     light: Float[ArrayLike, "..."], count: int, degree: int, dtype: jnp.dtype
 ) -> Float[Array, "..."]:
-    """Casts a light that all of `count` vertices share, or one for each, of at most this degree."""
-    light = as_float(light)
+    """Casts a light that all of `count` vertices share, or one for each, of at most this degree.
+
+    Raises `ValueError` for one that is at hand and not finite.
+    """
+    light = as_finite(light, "light")
     lights = light.shape[:-2][-1:]  # () where all vertices share one
     if light.ndim < 2 or light.shape[-2] != 3 or lights not in ((), (1,), (count,)):
         raise ValueError(
@@ -99,6 +104,7 @@ def checked_one_light(
 
 def checked_material(material: Material, count: int, dtype: jnp.dtype) -> Material:
     """Casts a material whose arrays per vertex are of `count` vertices."""
+    check_type("material", material, Material)
     for name, ndim in (("diffuse", 2), ("specular", 2), ("exponent", 1)):
         array = getattr(material, name)
         if array.ndim == ndim and len(array) != count:
@@ -111,9 +117,22 @@ def checked_material(material: Material, count: int, dtype: jnp.dtype) -> Materi
     return Material(*(array.astype(dtype) for array in arrays))
 
 
+def checked_albedo(
+    albedo: Float[ArrayLike, "..."], count: int, dtype: jnp.dtype
+) -> Float[Array, "..."]:
+    """Casts the albedo of a diffuse surface: a number, RGB, or per vertex with one or three."""
+    albedo = as_finite(albedo, "albedo", least=0.0)
+    if albedo.shape not in ((), (3,), (count, 1), (count, 3)):
+        raise ValueError(
+            f"expected albedo as a number, (3,), ({count}, 1) or ({count}, 3), got shape "
+            f"{albedo.shape}"
+        )
+    return _cast(albedo, dtype)
+
+
 def checked_eye(eye: Float[ArrayLike, "..."], dtype: jnp.dtype) -> Float[Array, " 3"]:
     """Casts a point or direction (3,)."""
-    eye = as_float(eye)
+    eye = as_finite(eye, "eye")
     if eye.shape != (3,):
         raise ValueError(f"expected eye (3,), got shape {eye.shape}")
     return _cast(eye, dtype)

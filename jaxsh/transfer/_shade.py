@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float
+from .._core.checks import align, as_float, check_flag, check_type
 from ..harmonics import degree_of
 from ._glossy_kernels import lobe_polynomial, lobe_products, reflected
-from ._material import Material, checked_eye, checked_light, checked_material
+from ._material import Material, checked_albedo, checked_eye, checked_light, checked_material
 from ._transfer import AbstractTransfer
 
 
@@ -33,9 +33,10 @@ def shade_diffuse(
 
     **Returns** (..., V, 3), in the dtype of the transfer. Linear in light, coefficients and
     albedo, and differentiable in each, forward and reverse; the positions and normals of the
-    transfer do not enter. Values are not looked at.
+    transfer do not enter.
 
-    Raises `ValueError` for shapes that do not fit.
+    Raises `ValueError` for shapes that do not fit, and for a light or an albedo that is at hand
+    (`docs/conventions.md`) and not finite, or an albedo below 0.
 
     **Example**
 
@@ -47,14 +48,10 @@ def shade_diffuse(
     >>> color.shape, round(float(color[0, 0]), 4)
     ((1, 3), 0.25)
     """
+    check_type("transfer", transfer, AbstractTransfer)
     count, dtype = transfer.num_points, transfer.dtype
-    light, albedo = checked_light(light, count, transfer.degree, dtype), as_float(albedo)
-    if albedo.shape not in ((), (3,), (count, 1), (count, 3)):
-        raise ValueError(
-            f"expected albedo as a number, (3,), ({count}, 1) or ({count}, 3), got shape "
-            f"{albedo.shape}"
-        )
-    return _shade_diffuse(light, transfer, albedo.astype(dtype))
+    light = checked_light(light, count, transfer.degree, dtype)
+    return _shade_diffuse(light, transfer, checked_albedo(albedo, count, dtype))
 
 
 @jax.jit
@@ -117,8 +114,8 @@ def shade_glossy(
     and transfer, and differentiable in all arguments, forward and reverse; light that rings below
     zero stays there.
 
-    Raises `ValueError` for shapes that do not fit, and for a sampled transfer of another degree
-    than the light's.
+    Raises `ValueError` for shapes that do not fit, for a sampled transfer of another degree than
+    the light's, and for a light or an eye that is at hand (`docs/conventions.md`) and not finite.
 
     **Example**
 
@@ -131,9 +128,11 @@ def shade_glossy(
     >>> color.shape
     (1, 3)
     """
+    check_type("transfer", transfer, AbstractTransfer)
     count, dtype = transfer.num_points, transfer.dtype
     eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
     light = checked_light(light, count, transfer.degree, dtype)
+    distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
     form = transfer.glossy_form(degree_of(light.shape[-1]))
     return _shade_glossy(light, form, eye, material, distant, normalized)
 
@@ -194,7 +193,8 @@ def reflected_direction(
     >>> [round(float(x), 2) for x in transfer.reflected_direction(eye, 0 * up, up)[0]]
     [-0.6, 0.0, 0.8]
     """
-    positions, normals = as_float(positions), as_float(normals)
+    distant = check_flag("distant", distant)
+    positions, normals = as_float(positions, "positions"), as_float(normals, "normals")
     if positions.ndim != 2 or positions.shape[1] != 3 or positions.shape != normals.shape:
         raise ValueError(
             f"expected positions and normals (V, 3), got shapes {positions.shape} and "

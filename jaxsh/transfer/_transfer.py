@@ -9,7 +9,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, DTypeLike, Float, Int, Int8
 
-from .._core.checks import check_degree, is_concrete
+from .._core.checks import (
+    as_float,
+    as_integer,
+    check_coefficients,
+    check_degree,
+    check_type,
+    is_concrete,
+)
 from .._core.linalg import matmul, tall_product
 from .._core.xla import materialize, on_mesh
 from ..harmonics import degree_of, num_coefficients
@@ -91,6 +98,7 @@ class Transfer(AbstractTransfer):
     through the mirrored direction alone. The coefficients of a bake are constants: neither they
     nor `shade_diffuse` change with the positions and normals stored beside them, so that its
     derivative in those is 0. `unshadowed` gives coefficients that do depend on the normals.
+    Raises `ValueError` for shapes that do not fit.
 
     **Example**
 
@@ -102,10 +110,24 @@ class Transfer(AbstractTransfer):
     (1, 2, (1, 4))
     """
 
-    coefficients: Float[Array, "v k"]
-    positions: Float[Array, "v 3"]
-    normals: Float[Array, "v 3"]
-    neighbors: Int[Array, "v n"]
+    coefficients: Float[Array, "v k"] = eqx.field(converter=lambda v: as_float(v, "coefficients"))
+    positions: Float[Array, "v 3"] = eqx.field(converter=lambda v: as_float(v, "positions"))
+    normals: Float[Array, "v 3"] = eqx.field(converter=lambda v: as_float(v, "normals"))
+    neighbors: Int[Array, "v n"] = eqx.field(converter=lambda v: as_integer(v, "neighbors"))
+
+    def __check_init__(self):
+        if self.coefficients.ndim != 2:
+            raise ValueError(f"expected coefficients (V, K), got shape {self.coefficients.shape}")
+        check_coefficients("coefficients", self.coefficients)
+        count = len(self.coefficients)
+        for name in ("positions", "normals"):
+            if getattr(self, name).shape != (count, 3):
+                raise ValueError(
+                    f"expected {name} ({count}, 3), one for each vertex of the coefficients, got "
+                    f"shape {getattr(self, name).shape}"
+                )
+        if self.neighbors.ndim != 2 or len(self.neighbors) != count:
+            raise ValueError(f"expected neighbors ({count}, n), got shape {self.neighbors.shape}")
 
     @property
     def num_points(self) -> int:
@@ -274,6 +296,7 @@ def sample(transfer: Transfer, degree: int | None = None) -> SampledTransfer:
     >>> transfer.sample(transfer.unshadowed(up, up, degree=1)).samples.shape
     (1, 6, 1)
     """
+    check_type("transfer", transfer, Transfer)
     return _sample(transfer, checked_degree(transfer, degree))
 
 
@@ -303,9 +326,13 @@ def quantize(transfer: Transfer) -> QuantizedTransfer:
     >>> transfer.quantize(transfer.unshadowed(up, up, degree=1)).codes.dtype.name
     'int8'
     """
+    check_type("transfer", transfer, Transfer)
     rows = transfer.coefficients
-    if is_concrete(rows) and not bool(jnp.isfinite(rows).all()):
-        raise ValueError("expected coefficients that are finite everywhere")
+    if is_concrete(rows):
+        with jax.ensure_compile_time_eval():  # known values inside `jit`, too
+            finite = bool(jnp.isfinite(rows).all())
+        if not finite:
+            raise ValueError("expected coefficients that are finite everywhere")
     codes, scales = in_steps(rows, 0)
     count, width = rows.shape
     # On a mesh of devices a single block, whose points stay sharded as they are.

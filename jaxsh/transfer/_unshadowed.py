@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import as_float, check_degree
+from .._core.checks import as_float, as_integer, check_degree
 from ..harmonics import convolve, evaluate, phong
 from ._transfer import Transfer
 
@@ -49,7 +49,8 @@ def unshadowed(
     >>> [round(float(x), 4) for x in jax.grad(leaving)(up + jnp.asarray([[1.0, 0.0, 0.0]]))[0]]
     [-0.0576, 0.0, 0.0576]
     """
-    positions, normals, degree = as_float(positions), as_float(normals), check_degree(degree)
+    positions, normals = as_float(positions, "positions"), as_float(normals, "normals")
+    degree = check_degree(degree)
     if normals.ndim != 2 or normals.shape[1] != 3 or positions.shape != normals.shape:
         raise ValueError(
             f"expected positions and normals (V, 3), got shapes {positions.shape} and "
@@ -58,7 +59,7 @@ def unshadowed(
     if neighbors is None:
         # Each point beside itself alone, which is how the table is filled up.
         neighbors = jnp.arange(len(normals), dtype=jnp.int32)[:, None]
-    neighbors = jnp.asarray(neighbors)
+    neighbors = as_integer(neighbors, "neighbors")
     if neighbors.ndim != 2 or len(neighbors) != len(normals):
         raise ValueError(f"expected neighbors ({len(normals)}, n), got shape {neighbors.shape}")
     positions = positions.astype(normals.dtype)

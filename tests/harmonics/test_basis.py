@@ -258,9 +258,9 @@ def test_bad_input_is_refused(f, unchecked):
         f(1.0, 2)
     with pytest.raises(ValueError, match=r"axis must be -1.*or 0.*got 1"):
         f(np.ones((3, 3)), 2, axis=1)
-    with pytest.raises(ValueError, match="expected real numbers, got dtype complex128"):
+    with pytest.raises(ValueError, match="expected real numbers for vectors, got dtype complex128"):
         f(np.ones((3, 3), complex), 2)
-    with pytest.raises(ValueError, match="expected real numbers, got dtype bool"):
+    with pytest.raises(ValueError, match="expected real numbers for vectors, got dtype bool"):
         f(np.ones((3, 3), bool), 2)
 
 

@@ -43,7 +43,7 @@ def test_index_agrees_with_degrees_and_orders(degree):
 
 @pytest.mark.parametrize(("l", "m"), [(-1, 0), (1, 2), (1, -2), (0, 1)])
 def test_index_refuses_orders_beyond_the_degree(l, m):
-    with pytest.raises(ValueError, match=f"got l = {l}, m = {m}"):
+    with pytest.raises(ValueError, match=r"m as an integer from -l to l|l must be an integer >= 0"):
         harmonics.index(l, m)
 
 

@@ -180,9 +180,9 @@ def test_bad_input_is_refused(unchecked):
         lambda bad: harmonics.triple_integral(good, bad, good),
         lambda bad: harmonics.triple_integral(good, good, bad),
     ):
-        with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got 8"):
+        with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape .*8,?\)"):
             call(np.ones(8))
-        with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got 0"):
+        with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape \(\)"):
             call(1.0)
     for call in (harmonics.product_matrix, lambda f, d: harmonics.product(f, f, d)):
         with pytest.raises(ValueError, match=r"degree must be an integer >= 0.*got -1"):

@@ -189,19 +189,21 @@ def test_rotate_z_generator_and_gradients(rng):
 def test_bad_rotations_are_refused(unchecked):
     c = np.ones(9)
     for call in (lambda r: harmonics.rotate(c, r), lambda r: harmonics.rotation_matrix(r, 2)):
-        with pytest.raises(ValueError, match=r"matrices \(\.\.\., 3, 3\), got shape \(4, 4\)"):
+        with pytest.raises(ValueError, match=r"rotation \(\.\.\., 3, 3\).* got shape \(4, 4\)"):
             call(np.eye(4))
-        with pytest.raises(ValueError, match=r"matrices \(\.\.\., 3, 3\), got shape \(3,\)"):
+        with pytest.raises(ValueError, match=r"rotation \(\.\.\., 3, 3\).* got shape \(3,\)"):
             call(np.ones(3))
-        with pytest.raises(ValueError, match=r"expected orthogonal matrices.* by 3\.0e\+00"):
+        with pytest.raises(
+            ValueError, match=r"expected rotation as orthogonal matrices.* by 3\.0e\+00"
+        ):
             call(2 * np.eye(3))
-        with pytest.raises(ValueError, match=r"expected orthogonal matrices.* by nan"):
+        with pytest.raises(ValueError, match=r"expected rotation as orthogonal matrices.* by nan"):
             call(np.full((3, 3), np.nan))
-        with pytest.raises(ValueError, match="expected orthogonal matrices"):
+        with pytest.raises(ValueError, match="expected rotation as orthogonal matrices"):
             call(np.stack([np.eye(3), np.zeros((3, 3))]))
-    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got 8"):
+    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape .*8,?\)"):
         harmonics.rotate(np.ones(8), np.eye(3))
-    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got 8"):
+    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape .*8,?\)"):
         harmonics.rotate_z(np.ones(8), 1.0)
     with pytest.raises(ValueError, match="got 0"):
         harmonics.rotate(1.0, np.eye(3))

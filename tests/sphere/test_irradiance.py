@@ -152,9 +152,9 @@ def test_a_zero_normal_has_no_irradiance():
 
 
 def test_bad_input_is_refused(unchecked):
-    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got 8"):
+    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape .*8,?\)"):
         sphere.irradiance(np.ones((3, 8)), np.ones((2, 3)))
-    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got 0"):
+    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape \(\)"):
         sphere.irradiance(1.0, np.ones((2, 3)))
     for normals in (np.ones((2, 4)), 1.0):
         with pytest.raises(ValueError, match=r"expected normals \(\.\.\., 3\).*got shape"):

@@ -188,7 +188,7 @@ def test_bad_input_is_refused(unchecked):
         sphere.project_lat_long(np.ones((9, 9, 1)), -1)
     with pytest.raises(ValueError, match=r"coefficients \(channels, K\), got shape \(9,\)"):
         sphere.reconstruct_lat_long(np.ones(9), 4, 8)
-    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got 8"):
+    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape .*8,?\)"):
         sphere.reconstruct_lat_long(np.ones((1, 8)), 4, 8)
     with pytest.raises(ValueError, match=r"height must be an integer >= 1, got 0"):
         sphere.reconstruct_lat_long(np.ones((1, 9)), 0, 8)

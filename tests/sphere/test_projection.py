@@ -237,9 +237,9 @@ def test_bad_input_is_refused(unchecked):
             sphere.project(values, quadrature, 1)
     with pytest.raises(ValueError, match=r"degree must be an integer >= 0.*got -1"):
         sphere.project(np.ones(6), quadrature, -1)
-    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got 8"):
+    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape .*8,?\)"):
         sphere.reconstruct(np.ones(8), quadrature.directions)
-    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got 0"):
+    with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape \(\)"):
         sphere.reconstruct(1.0, quadrature.directions)
     for directions in (np.ones((2, 4)), np.ones(3), np.ones((2, 2, 3))):
         with pytest.raises(ValueError, match=r"expected directions \(N, 3\), got shape"):
