@@ -155,7 +155,8 @@ def test_lists_are_as_good_as_arrays(module, name, tables, unchecked):
         jax.eval_shape(lambda given=given: call.function(**on_device(call, given)))
         for given in (call.arguments, lists)
     )
-    assert jax.tree.leaves(found) == jax.tree.leaves(expected)
+    for array, other in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
+        assert (array.shape, array.dtype.kind) == (other.shape, other.dtype.kind)
 
 
 @pytest.mark.filterwarnings("ignore:A JAX array is being set as static")  # by Equinox, before us
@@ -183,6 +184,8 @@ def test_wrong_arguments_are_refused_in_one_sentence(module, name, tables, unche
     names = list(call.arguments)
     for first, second in itertools.pairwise(names):
         a, b = call.arguments[first], call.arguments[second]
+        if call.slow and type(a) is type(b):
+            continue
         swapped = refusal(call, {**call.arguments, first: b, second: a}, f"{first} {second}")
         if swapped not in (None, "taken"):
             found.append(f"{first} and {second} swapped: {swapped}")

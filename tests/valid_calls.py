@@ -244,7 +244,7 @@ def of_sky():
             turbidity=(2.5, 6.0),
             degree=1,
             constants="paper",
-            host=True,
+            slow=True,
         ),
         "habel2008_monomials": of(k.habel2008_monomials, fit=plain_fit(), host=True),
         "horizontal_irradiance": of(
@@ -265,12 +265,12 @@ def of_sky():
             scales=floats(3, 5),
             solver="qr",
             max_steps=9,
-            host=True,
+            slow=True,
             finite="design targets scales",
         ),
         "preetham_constants": of(k.preetham_constants, name="paper"),
         "preetham_fit": of(
-            k.preetham_fit, terms=(4, 3), turbidity=(3.0, 4.0), degree=1, lawson=0, host=True
+            k.preetham_fit, terms=(4, 3), turbidity=(3.0, 4.0), degree=1, lawson=0, slow=True
         ),
         "preetham_harmonics": of(
             k.preetham_harmonics,
