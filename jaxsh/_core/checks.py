@@ -270,13 +270,13 @@ def check_batches(**shapes: tuple[int, ...]) -> None:
         raise ValueError(f"leading axes must broadcast, got {said}") from None
 
 
-def check_vectors(name: str, array: Array) -> None:
+def check_vectors(name: str, array: Array | np.ndarray) -> None:
     """Raises `ValueError` unless the last axis holds x, y and z."""
     if array.ndim == 0 or array.shape[-1] != 3:
         raise ValueError(f"expected {name} (..., 3) with x, y, z last, got shape {array.shape}")
 
 
-def check_coefficients(name: str, array: Array) -> int:
+def check_coefficients(name: str, array: Array | np.ndarray) -> int:
     """The degree of functions (..., K); raises `ValueError` where K is not a square."""
     count = array.shape[-1] if array.ndim else 0
     bands = math.isqrt(count)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_finite, check_vectors
+from .._core.checks import align, as_finite, as_float, check_vectors
 from .._core.xla import in_blocks, keep_batch, on_mesh
 from ..harmonics import degrees, orders
 
@@ -48,7 +48,7 @@ def directions(value: Float[ArrayLike, "*batch 3"], name: str) -> Float[Array, "
 
 def parameter(value: Float[ArrayLike, "*batch"], dtype, name: str) -> Float[Array, "*batch"]:
     """Converts a model's number, one per sun, to the directions' dtype."""
-    return as_finite(value, name).astype(dtype)
+    return as_float(value, name).astype(dtype)
 
 
 def each_sun(

@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, check_batches, described
-from ._angles import angles, directions, parameter
+from .._core.checks import align, as_finite, check_batches, described
+from ._angles import angles, directions
 from ._preetham import gradation
 from ._validity import Check, check_option, check_sun
 
@@ -69,7 +69,7 @@ def cie_radiance(
     row = _coefficients(kind)
     check_option(check)
     view, sun = directions(view, "view"), directions(sun, "sun")
-    zenith = parameter(zenith_luminance, jnp.result_type(view, sun), "zenith_luminance")
+    zenith = as_finite(zenith_luminance, "zenith_luminance").astype(jnp.result_type(view, sun))
     check_batches(view=view.shape, sun=sun.shape, zenith_luminance=(*zenith.shape, 1))
     check_sun(sun, check)
     return _radiance(view, sun, zenith, jnp.asarray(row, zenith.dtype))

@@ -10,6 +10,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import (
     align,
+    as_finite,
     as_float,
     check_batches,
     check_choice,
@@ -19,7 +20,7 @@ from .._core.checks import (
 from .._core.host import read_only_cache
 from .._core.linalg import matmul
 from ..sphere import reconstruct
-from ._angles import directions, each_sun, parameter
+from ._angles import directions, each_sun
 from ._color import xyz_to_srgb
 from ._preetham import preetham_radiance
 from ._project import project_preetham
@@ -113,7 +114,7 @@ def smallest_luminance(
     """
     check_choice("reading", reading, get_args(Reading))
     sun = directions(sun, "sun")
-    turbidity = parameter(turbidity, sun.dtype, "turbidity")
+    turbidity = as_finite(turbidity, "turbidity").astype(sun.dtype)
     check_batches(sun=sun.shape, turbidity=(*turbidity.shape, 1))
     return _smallest(sun, turbidity, reading, check_degree(degree))
 

@@ -6,7 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_finite, check_batches, check_coefficients, is_concrete
+from .._core.checks import (
+    align,
+    as_finite,
+    as_float,
+    check_batches,
+    check_coefficients,
+    is_concrete,
+)
 from ..harmonics import degree_of, index, num_coefficients
 
 
@@ -59,9 +66,11 @@ def with_ground(
     if light.ndim < 2:
         raise ValueError(f"expected light (..., channels, K), got shape {light.shape}")
     irradiance = horizontal_irradiance(light)
-    albedo = as_finite(albedo, "albedo", least=0.0).astype(light.dtype)
-    if is_concrete(albedo) and (np.asarray(albedo) > 1).any():
-        raise ValueError(f"albedo must be in [0, 1], got {np.asarray(albedo).max():g}")
+    albedo = as_float(albedo, "albedo").astype(light.dtype)
+    if is_concrete(albedo):
+        known = np.asarray(albedo)
+        if (wrong := ~((known >= 0) & (known <= 1))).any():
+            raise ValueError(f"albedo must be in [0, 1], got {known[wrong].flat[0]:g}")
     check_batches(light=light.shape, albedo=(*albedo.shape, 1))
     radiance = jnp.multiply(*align(irradiance, albedo))[..., None] / math.pi
     step = jnp.asarray(_lower_hemisphere(light.shape[-1]), light.dtype)

@@ -226,8 +226,8 @@ def test_levels_map_over_lights(rng):
     ("options", "message"),
     [
         ({"base": 5}, "base from 0 to the light's degree, 4, got 5"),
-        ({"rings": -1}, "rings >= 0, got -1"),
-        ({"fallback": "middle"}, "fallback to be one of .* got 'middle'"),
+        ({"rings": -1}, "rings must be an integer >= 0, got -1"),
+        ({"fallback": "middle"}, "fallback must be one of .* got 'middle'"),
         ({"fallback": "bas"}, "did you mean 'base'"),
         ({"threshold": -1.0}, "threshold must be >= 0, got -1"),
         ({"threshold": np.ones(3)}, r"threshold as a number, got shape \(3,\)"),

@@ -43,8 +43,8 @@ def test_every_method_at_its_finest_is_the_full_computation(rng, quantized, tole
 @pytest.mark.parametrize(
     ("method", "message"),
     [
-        ("magic", "no method 'magic'; it has masks, levels, two_stage, anchors, tiles"),
-        ("level", "no method 'level'; did you mean 'levels'?"),
+        ("magic", "method must be one of masks, levels, two_stage, anchors, tiles, got 'magic'"),
+        ("level", "got 'level'; did you mean 'levels'?"),
         ("two-stage", "did you mean 'two_stage'?"),
     ],
 )

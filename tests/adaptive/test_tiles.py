@@ -325,19 +325,23 @@ def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
     with pytest.raises(ValueError, match="expected a tiling of 100 vertices, got one of 300"):
         arrange(jax.tree.map(lambda x: x[:100] % 100, ball), tiles.tiling)
     for wrong in ({"directions": 0}, {"exponent": -1.0}, {"exponent": float("nan")}):
-        with pytest.raises(ValueError, match="directions of at least 1"):
+        with pytest.raises(
+            ValueError, match=r"directions must be an integer >= 1|exponent must be a number > -1"
+        ):
             make_tiles(ball, EYE, **wrong)
-        with pytest.raises(ValueError, match="directions of at least 1"):
+        with pytest.raises(
+            ValueError, match=r"directions must be an integer >= 1|exponent must be a number > -1"
+        ):
             make_tile_atlas(ball, **wrong)
     with pytest.raises(ValueError, match="a view from 0 to 1, got 2"):
         make_tile_atlas(ball, views=2, num_tiles=2).tiling(2)
-    with pytest.raises(ValueError, match="at least 1"):
+    with pytest.raises(ValueError, match="num_tiles must be an integer >= 1"):
         make_tiles(ball, EYE, num_tiles=0)
     with pytest.raises(ValueError, match="eye"):
         make_tiles(ball, EYE[:2])
     with pytest.raises(ValueError, match="keep of at least 2"):
         TileFollower(make_tile_atlas(ball, views=1, num_tiles=2), ball, EYE, keep=1)
-    with pytest.raises(ValueError, match="at least 1 view"):
+    with pytest.raises(ValueError, match="views must be an integer >= 1"):
         make_tile_atlas(ball, views=0)
 
 

@@ -205,7 +205,7 @@ def test_bad_rotations_are_refused(unchecked):
         harmonics.rotate(np.ones(8), np.eye(3))
     with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape .*8,?\)"):
         harmonics.rotate_z(np.ones(8), 1.0)
-    with pytest.raises(ValueError, match="got 0"):
+    with pytest.raises(ValueError, match=r"got shape \(\)"):
         harmonics.rotate(1.0, np.eye(3))
 
 

@@ -153,9 +153,9 @@ def test_fits_of_lights_refuse_mistakes(baked, unchecked):
         inverse.fit_polygons(observed, baked, ALBEDO, [[lamp], [lamp, lamp]])
     with pytest.raises(ValueError, match="4 vertices"):
         inverse.fit_polygons(observed, baked, ALBEDO, [Polygon(lamp.vertices[:3], lamp.radiance)])
-    with pytest.raises(ValueError, match="at least one light"):
+    with pytest.raises(ValueError, match="at least 1 of Polygon"):
         inverse.fit_colors(observed, baked, ALBEDO, [])
-    with pytest.raises(ValueError, match="upper bound"):
+    with pytest.raises(ValueError, match="upper must be a number > 0"):
         inverse.fit_colors(observed, baked, ALBEDO, [lamp], upper=0.0)
     with pytest.raises(ValueError, match="expected observed"):
         inverse.fit_colors(observed[:5], baked, ALBEDO, [lamp])

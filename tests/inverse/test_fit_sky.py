@@ -144,8 +144,8 @@ def test_refusals(baked):
         "3 numbers of observed are NaN": lambda: fit(observed.at[0].set(np.nan), albedo=1.0),
         "there is no light": lambda: fit(jnp.zeros((603, 3)), albedo=1.0),
         "turbidity must be bounds": lambda: fit(observed, albedo=1.0, turbidity=(6.0, 2.5)),
-        "exposure must be positive": lambda: fit(observed, albedo=1.0, exposure=0.0),
-        "at least 1 start": lambda: fit(observed, albedo=1.0, starts=0),
+        "exposure must be a number > 0": lambda: fit(observed, albedo=1.0, exposure=0.0),
+        "starts must be an integer >= 1": lambda: fit(observed, albedo=1.0, starts=0),
     }.items():
         with pytest.raises(ValueError, match=re.escape(sentence)):
             call()

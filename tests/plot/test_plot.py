@@ -111,7 +111,7 @@ def test_light_tells_one_negative_channel_and_ignores_rounding():
         (np.zeros((2, 9)), r"expected coefficients .* got shape \(2, 9\)"),
         (np.zeros((4, 3, 9)), r"got shape \(4, 3, 9\)"),
         (np.array([np.nan, 0, 0, 1]), "light must be finite, got 1 of 4"),
-        (np.ones((8, 16, 3), complex), "real numbers, got dtype complex128"),
+        (np.ones((8, 16, 3), complex), "expected real numbers for light, got .* dtype complex128"),
         (np.ones((8, 8, 3)), "twice as wide as high, got width 8 and height 8"),
         (np.ones((3, 8, 16)), "channels come last"),
         (np.ones((8, 16, 3), np.uint8), "srgb_decode"),
@@ -218,5 +218,5 @@ def test_nothing_is_shown_and_no_backend_chosen(monkeypatch):
 
 
 def test_tracers_are_refused():
-    with pytest.raises(jax.errors.TracerArrayConversionError):
+    with pytest.raises(ValueError, match="runs on the host, before jit"):
         jax.jit(lambda light: plot.bands(light) and light)(jnp.ones(4))

@@ -240,7 +240,7 @@ def test_skies_that_are_refused():
         ({"parameters": {"haze": (0.0, 1.0)}}, r"0 < low < high"),
         ({"log": ["smoke"]}, "no parameter: smoke"),
         ({"terms": (4,)}, "expected 2 positive terms"),
-        ({"samples": (4, 0)}, "expected 2 positive samples"),
+        ({"samples": (4, 0)}, "samples must be an integer >= 1, got 0"),
         ({"samples": (4, 9)}, "at least as many samples as terms"),
         ({"zenith": 4.0}, r"angle in \(0, π\)"),
         ({"degree": -1}, "degree must be"),
