@@ -35,10 +35,7 @@ def as_float(value: ArrayLike, name: str = "") -> Float[Array, "..."]:
     if not jnp.issubdtype(array.dtype, jnp.integer):
         raise ValueError(f"expected real numbers{_for(name)}, got dtype {array.dtype}")
     if array.dtype.itemsize < 4:
-        raise ValueError(
-            f"expected real numbers{_for(name)}, got dtype {array.dtype}: decode a picture's codes "
-            "first, cast other small integers to float"
-        )
+        raise ValueError(f"expected real numbers{_for(name)}, got dtype {said_dtype(array.dtype)}")
     return array.astype(jnp.result_type(float))
 
 
@@ -71,9 +68,11 @@ def as_host_float(value: ArrayLike, name: str) -> Float[np.ndarray, "..."]:
         array = np.asarray(value)
     except (TypeError, ValueError):  # lists of several lengths
         raise ValueError(f"expected real numbers for {name}, got {described(value)}") from None
+    if array.dtype.kind in "iu" and array.dtype.itemsize < 4:
+        raise ValueError(f"expected real numbers for {name}, got dtype {said_dtype(array.dtype)}")
     if jnp.issubdtype(array.dtype, jnp.floating):
         return array
-    if array.dtype.kind in "iu" and array.dtype.itemsize >= 4:  # smaller are a picture's codes
+    if array.dtype.kind in "iu":
         return array.astype(np.float64)
     raise ValueError(f"expected real numbers for {name}, got {described(value)}")
 
@@ -143,6 +142,16 @@ def _as_array(value: Any, name: str) -> Array:
         if isinstance(error, jax.errors.JAXTypeError):  # of tracing
             raise
         raise ValueError(f"expected real numbers{_for(name)}, got {described(value)}") from None
+
+
+def said_dtype(dtype: Any) -> str:
+    """Names a dtype; that of a picture's codes with the way to decode them."""
+    if dtype in (jnp.uint8, jnp.uint16):
+        return (
+            f"{dtype}: the codes of a picture, to be decoded to light by "
+            f"imaging.srgb_decode(image / {jnp.iinfo(dtype).max})"
+        )
+    return f"{dtype}"
 
 
 def described(value: Any) -> str:

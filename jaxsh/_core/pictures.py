@@ -12,6 +12,8 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from .checks import said_dtype
+
 
 def as_radiance(name: str, value: Any) -> Float[Array, "..."]:
     """Convert to a JAX array of floats, of any shape.
@@ -28,7 +30,7 @@ def as_radiance(name: str, value: Any) -> Float[Array, "..."]:
             kind = type(value).__name__
             raise ValueError(f"expected {name} as an array of floats, got {kind}") from None
     if not jnp.issubdtype(array.dtype, jnp.floating):
-        raise ValueError(f"expected {name} in floats, got {_decoded(array.dtype)}")
+        raise ValueError(f"expected {name} in floats, got {said_dtype(array.dtype)}")
     return array
 
 
@@ -95,13 +97,3 @@ def _check_lat_long(name: str, height: int, width: int) -> None:
         f"expected {name} to be lat-long, about twice as wide as high, got width {width} and "
         f"height {height}{''.join(likely)}"
     )
-
-
-def _decoded(dtype: Any) -> str:
-    if dtype in (jnp.uint8, jnp.uint16):
-        most = jnp.iinfo(dtype).max
-        return (
-            f"{dtype}: the codes of a picture, to be decoded to light by "
-            f"imaging.srgb_decode(image / {most})"
-        )
-    return f"{dtype}"

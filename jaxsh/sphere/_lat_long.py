@@ -50,7 +50,7 @@ def project_lat_long(image: Float[ArrayLike, "h w c"], degree: int) -> Float[Arr
     height, width, _ = image.shape
     if min(height, width) <= 2 * degree:
         raise ValueError(
-            f"image of {height} rows and {width} columns is too small for degree "
+            f"an image of {height} rows and {width} columns is too small for degree "
             f"{degree}: both must be above {2 * degree}"
         )
     coefficients = _project(image, degree)
