@@ -129,7 +129,8 @@ def test_a_public_function_without_a_valid_call_fails(tables):
         package = importlib.import_module(f"jaxsh.{module}")
         public = {name for name in package.__all__ if callable(getattr(package, name))}
         listed = {name.partition(".")[0] for name in tables[module]}
-        assert public - listed == valid_calls.MADE[module]
+        assert public - listed - valid_calls.MADE[module] == set()
+        assert valid_calls.MADE[module] <= public
 
 
 @pytest.mark.parametrize(("module", "name"), CASES, ids=lambda x: x)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsh import adaptive, harmonics, inverse, midrange, plot, sky, sphere, transfer
+from jaxsh import adaptive, geometry, harmonics, inverse, midrange, plot, sky, sphere, transfer
 
 RNG = np.random.default_rng(14)
 V, K = 6, 9
@@ -39,6 +39,11 @@ def made():
     """A transfer of degree 2."""
     normals = RNG.normal(size=(V, 3))
     return transfer.unshadowed(jnp.asarray(normals), jnp.asarray(normals), 2)
+
+
+@functools.cache
+def knot():
+    return geometry.knot(300)
 
 
 def eye():
@@ -485,8 +490,7 @@ MADE = {
     "sky": {"Axis", "FitError", "PreethamConstants", "SkyFit", "SkyWarning", "Solution"},
     "transfer": {
         "AbstractTransfer",
-        "FixedLight",
-        "FixedView",
+        "bake",
         "QuantizedTransfer",
         "SampledTransfer",
     },
