@@ -94,7 +94,9 @@ def read_mesh(
         if isinstance(error, ImportError | MemoryError):
             raise
         reason = str(error).strip().split("\n")[0]
-        raise ValueError(f"{path}: damaged or not a {suffix} file: {reason}") from error
+        # What glTF's reader refuses need not be damaged: a compression, say.
+        kind = "" if gltf and type(error) is ValueError else f"damaged or not a {suffix} file: "
+        raise ValueError(f"{path}: {kind}{reason}") from error
     if up == "y":
         polygons = _turned(polygons)
     return assemble(
