@@ -3,8 +3,9 @@
 #   make test        the tests, without the slow ones
 # Also: make test-slow (those, and the examples of the docstrings), make test-all (both), make check
 # (lint, types), make docs (the pages, built strictly), make test-oldest (the oldest JAX that is
-# supported), make test-newest (the newest Python here, and its JAX), make test-minimal (without the packages that only some functions need), make package
-# (wheel and sdist), make bench (beside the peers), make clean.
+# supported), make test-newest (the newest Python here, and its JAX), make test-minimal (without the
+# packages that only some functions need), make package (wheel and sdist), make bench (beside the
+# peers), make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -17,10 +18,10 @@ bin := $(VENV)/bin
 PARALLEL ?= -n auto --dist loadfile
 # What JAX itself may break.
 NUMERICAL := adaptive geometry harmonics inverse midrange sky sphere transfer
-# Less optimizing, and XLA's older code for loops on the CPU where this JAX still knows it: programs run
-# slower and compile 40 % faster, which is most of what tests do. Slow tests, test-all and a plain
-# pytest go without. (Level 0 is faster still, and wrong: look_up then misses its pixels.)
-QUICK_COMPILE ?= --xla_backend_optimization_level=1 --xla_cpu_use_fusion_emitters=false
+# Unoptimized machine code, by XLA's older way for loops on the CPU where this JAX still knows it: that
+# runs slower and compiles in half the time, which is most of what tests do. Slow tests, test-all and
+# a plain pytest go without.
+QUICK_COMPILE ?= --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false
 
 .PHONY: reproduce test test-slow test-all test-oldest test-newest test-minimal check docs package bench clean
 

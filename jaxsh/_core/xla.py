@@ -45,6 +45,16 @@ def materialize(function, *arguments):
     return jax.lax.platform_dependent(*arguments, cpu=conditional, default=function)
 
 
+def rounded_once(function, *arguments):
+    """`function(*arguments)`, the same bits for all that use it.
+
+    For a place whose whole part is an index and whose rest is a weight. Fused into each use, it may
+    be rounded differently in each: on the border of a cell the index is then one cell's and the
+    weight another's.
+    """
+    return jax.lax.optimization_barrier(materialize(function, *arguments))
+
+
 def in_turn(function, tree):
     """`function` of each row of a tree of arrays: one after the other on one CPU, else all at once.
 

@@ -1,12 +1,14 @@
 """Lat-long environments seen along directions, and behind what a camera sees."""
 
+import functools
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._core.pictures import as_picture, as_radiance
-from .._core.xla import keep_rows
+from .._core.xla import keep_rows, rounded_once
 from ._camera import Camera
 
 
@@ -69,17 +71,7 @@ def _backdrop(environment, camera: Camera):
 @jax.jit
 def _look_up(environment, directions):
     height, width, _ = environment.shape
-    dtype = directions.dtype
-    x, y, z = (directions[..., axis] for axis in range(3))
-    squared = x * x + y * y
-    aside = squared > 0  # on the poles the angles have no derivative
-    safe = jnp.where(aside, squared, 1)
-    theta = jnp.arctan2(jnp.where(aside, jnp.sqrt(safe), 0), jnp.where(aside, z, 1))
-    theta = jnp.where(aside, theta, jnp.where(z < 0, jnp.asarray(jnp.pi, dtype), 0))
-    phi = jnp.arctan2(jnp.where(aside, y, 0), jnp.where(aside, x, 1))
-    row = jnp.clip(theta / jnp.pi, 0, 1) * height - 0.5
-    column = (phi / (2 * jnp.pi)) % 1 * width - 0.5
-
+    row, column = rounded_once(functools.partial(_place, height, width), directions)
     # Beyond the edge so much that half-way, on the pole, all columns meet in their mean.
     top, bottom = (
         2 * jnp.mean(edge, axis=1, keepdims=True) - edge
@@ -96,3 +88,16 @@ def _look_up(environment, directions):
         for k in (i + 1, i + 2)
     )
     return upper * (1 - down) + lower * down
+
+
+def _place(height: int, width: int, directions):
+    """Row and column of each direction, counted in pixels from the center of the first."""
+    dtype = directions.dtype
+    x, y, z = (directions[..., axis] for axis in range(3))
+    squared = x * x + y * y
+    aside = squared > 0  # on the poles the angles have no derivative
+    safe = jnp.where(aside, squared, 1)
+    theta = jnp.arctan2(jnp.where(aside, jnp.sqrt(safe), 0), jnp.where(aside, z, 1))
+    theta = jnp.where(aside, theta, jnp.where(z < 0, jnp.asarray(jnp.pi, dtype), 0))
+    phi = jnp.arctan2(jnp.where(aside, y, 0), jnp.where(aside, x, 1))
+    return jnp.clip(theta / jnp.pi, 0, 1) * height - 0.5, (phi / (2 * jnp.pi)) % 1 * width - 0.5

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
 from .._core.checks import as_float, is_concrete
-from .._core.xla import on_mesh
+from .._core.xla import on_mesh, rounded_once
 from ._expansion import check_positions
 from ._weights import Cells, Weights
 
@@ -139,7 +139,7 @@ def _trilinear(
 ) -> tuple[Float[Array, "v 8"], Int[Array, " v"]]:
     """Weights of the corners of the cell that each position is in, and that cell."""
     spans = np.array(shape, np.int32) - 1
-    whole, share = _places(positions, lower, upper, spans)
+    whole, share = rounded_once(functools.partial(_places, spans=spans), positions, lower, upper)
     sides = jnp.stack([1 - share, share])
     x, y, z = (sides[_CORNERS[:, axis], :, axis] for axis in range(3))
     cell = (whole[:, 0] * spans[1] + whole[:, 1]) * spans[2] + whole[:, 2]
@@ -162,7 +162,8 @@ def _dense(
     shape: tuple[int, int, int],
 ) -> Float[Array, "v s"]:
     """The same weights for all samples, most of them zero."""
-    whole, share = _places(positions, lower, upper, np.array(shape, np.int32) - 1)
+    places = functools.partial(_places, spans=np.array(shape, np.int32) - 1)
+    whole, share = rounded_once(places, positions, lower, upper)
     along = []
     for axis, count in enumerate(shape):
         sample, cell = np.arange(count, dtype=np.int32)[None], whole[:, axis, None]

@@ -21,7 +21,7 @@ COUNT = 8
 def test_the_basis_and_its_gradient(dtype, rng):
     def everything(d):
         first = harmonics.evaluate(d, 2, axis=0)
-        slope = jax.grad(lambda d: jnp.sum(harmonics.evaluate(d, 2) ** 2))(d)
+        slope = jax.grad(lambda d: jnp.sum(harmonics.evaluate(d, 2) ** 3))(d)
         return first, *harmonics.evaluate_with_gradient(d, 2), slope
 
     directions = rng.normal(size=(COUNT, 3)).astype(dtype)

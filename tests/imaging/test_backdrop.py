@@ -49,6 +49,7 @@ def test_look_up_is_the_slow_twin(rng, shape):
 
 
 def test_pixel_centers_are_met_exactly(rng):
+    # Unoptimized code, as in `make test`, would round a place anew in each use.
     environment = jnp.asarray(rng.uniform(size=(6, 12, 3)))
     directions = jnp.asarray(painters.jaxsh_lat_long(6))
     np.testing.assert_allclose(look_up(environment, directions), environment, atol=1e-13)
