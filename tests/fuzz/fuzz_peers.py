@@ -77,7 +77,7 @@ def _by_openimageio(path: Path) -> Summary | None:
 
     picture = oiio.ImageBuf(str(path))
     pixels = picture.get_pixels(oiio.FLOAT)
-    if picture.has_error or pixels is None:
+    if picture.geterror() or pixels is None:  # asked for, or it is printed at the end
         return None
     return np.broadcast_to(pixels, (*pixels.shape[:2], 3)).astype(np.float64).mean(axis=(0, 1))
 

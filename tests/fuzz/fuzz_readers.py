@@ -49,6 +49,13 @@ def read(kind: str, path: Path):
     if kind in MESHES:
         return geometry.read_mesh(path)
     if kind in PICTURES:
+        try:
+            return imaging.read_environment(path)
+        except ValueError as error:
+            if "repair=True" not in str(error):
+                raise
+            _check_words(str(error), path)
+            warnings.warn(f"{path}: repaired", UserWarning, stacklevel=2)
         return imaging.read_environment(path, repair=True)
     return transfer.load(path)
 
