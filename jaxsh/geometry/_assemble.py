@@ -7,6 +7,7 @@ from typing import Literal
 import jax.numpy as jnp
 import numpy as np
 
+from .._core.words import reason
 from ._clean import Clean, clean
 from ._files._polygons import Polygons
 from ._files._triangulate import triangulate
@@ -85,7 +86,8 @@ def assemble(
     attributes += [a for a in (uv, colors) if a is not None]
     found += whole.found
     if found:
-        warnings.warn(f"{source}: {', '.join(found)}", UserWarning, stacklevel=3)
+        said = reason(", ".join(found), 600)  # names in the file may be anything
+        warnings.warn(f"{source}: {said}", UserWarning, stacklevel=3)
 
     material = None
     if polygons.polygon_material is not None and polygons.materials:

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from .._core.words import reason
 from ._assemble import Origin, assemble, check_options
 from ._files._gltf import read_gltf
 from ._files._obj import read_obj
@@ -93,10 +94,9 @@ def read_mesh(
     except Exception as error:  # a parser may raise anything when a file is damaged
         if isinstance(error, ImportError | MemoryError):
             raise
-        reason = str(error).strip().split("\n")[0]
         # What glTF's reader refuses need not be damaged: a compression, say.
         kind = "" if gltf and type(error) is ValueError else f"damaged or not a {suffix} file: "
-        raise ValueError(f"{path}: {kind}{reason}") from error
+        raise ValueError(f"{path}: {kind}{reason(error)}") from error
     if up == "y":
         polygons = _turned(polygons)
     return assemble(

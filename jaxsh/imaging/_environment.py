@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._core.words import reason
 from ._files import FORMATS, Picture, check_encoding, read_picture
 from ._layouts import check_shape, used_pixels
 from ._orientation import axes_of, check_options, turn_columns
@@ -152,7 +153,7 @@ def _read(path: Path, encoding: str | None, layer: str | None, repair: bool) -> 
     try:
         return read_picture(path, encoding, layer, repair)
     except ValueError as error:
-        raise ValueError(f"{path}: {error}") from error
+        raise ValueError(f"{path}: {reason(error, 350)}") from error
 
 
 def _checked(

@@ -32,20 +32,23 @@ _UV = POINTS[:, :2] / 2 + 0.125
 def _obj() -> list[bytes]:
     lines = [f"v {x:g} {y:g} {z:g}" for x, y, z in POINTS]
     plain = [*lines, *("f " + " ".join(str(i + 1) for i in p) for p in POLYGONS)]
+    rows = zip(lines, _COLORS / 255, strict=True)
+    caps = [" ".join(f"{i + 1}/{i + 1}/{n}" for i in p) for n, p in enumerate(POLYGONS[:2], 1)]
+    walls = []
+    for p in POLYGONS[2:]:  # with normals of their own, and indices that count back; some broken
+        x, y = _RING[p[1]] - _RING[p[0]]
+        corners = [f"{i - 12}//-1" if i % 2 else f"{i + 1}/{i + 1}/-1" for i in p]
+        join = " " if len(walls) < 6 else " \\\n "
+        walls += [f"vn {y:g} {-x:g} 0", "f " + join.join(corners)]
     full = [
-        "# an L", "mtllib scene.mtl", "o one",
-        *(f"v {x:g} {y:g} {z:g} {r / 255:.6f} {g / 255:.6f} {b / 255:.6f}"
-          for (x, y, z), (r, g, b, _) in zip(POINTS, _COLORS, strict=True)),
-        *(f"vt {u:g} {v:g}" for u, v in _UV), "vn 0 0 -1", "vn 0 0 1", "vn 0.6 0.8 0",
-        "s off", "g caps", "usemtl red",
-        *("f " + " ".join(f"{i + 1}/{i + 1}/{n}" for i in p)
-          for n, p in enumerate(POLYGONS[:2], 1)),
-        "g walls", "usemtl blue",
-        *("f " + " ".join(f"{i - 12}//-1" for i in p) for p in POLYGONS[2:5]),
-        *("f " + " ".join(f"{i + 1}/{i + 1}" for i in p[:2]) + " \\\n " +
-          " ".join(f"{i + 1}/{i + 1}" for i in p[2:]) for p in POLYGONS[5:]),
-        "l 1 2", "p 1",
-    ]  # fmt: skip
+        *("# an L", "mtllib scene.mtl", "o one"),
+        *(f"{line} {r:.6f} {g:.6f} {b:.6f}" for line, (r, g, b, _) in rows),
+        *(f"vt {u:g} {v:g}" for u, v in _UV),
+        *("vn 0 0 -1", "vn 0 0 1", "s off", "g caps", "usemtl red"),
+        *(f"f {cap}" for cap in caps),
+        *("g walls", "usemtl blue"),
+        *walls,
+    ]
     return ["\n".join(text).encode() + b"\n" for text in (plain, full)]
 
 
@@ -54,8 +57,8 @@ def _off() -> list[bytes]:
     faces = [" ".join(map(str, [len(p), *p])) for p in POLYGONS]
     plain = ["OFF", "12 8 18", *points, *faces]
     glued = ["OFF12 8 0", "# a comment", "", *points, *(f"{face} 255 0 0" for face in faces)]
-    rows = zip(points, _COLORS.tolist(), strict=True)
-    colored = ["COFF", "12 8 0", *(f"{p} {r} {g} {b} {a}" for p, (r, g, b, a) in rows), *faces]
+    shares = [" ".join(f"{c:.3f}" for c in row) for row in _COLORS / 255]
+    colored = ["COFF", "12 8 0", *map(" ".join, zip(points, shares, strict=True)), *faces]
     head = b"OFF BINARY\n" + struct.pack(">3i", 12, 8, 0)
     body = POINTS.astype(">f4").tobytes()
     body += b"".join(struct.pack(f">{len(p) + 2}i", len(p), *p, 0) for p in POLYGONS)
@@ -93,8 +96,7 @@ def _ply() -> list[bytes]:
             f"property list {count} {index} vertex_indices", "end_header\n",
         ]).encode()  # fmt: skip
 
-    normals = np.tile([0.6, 0.0, 0.8], (12, 1))
-    rows = np.c_[POINTS, normals, _UV, _COLORS]
+    rows = np.c_[POINTS, _outward(POINTS), _UV, _COLORS]
     text = "".join(" ".join(f"{c:g}" for c in row) + "\n" for row in rows)
     text += "".join(" ".join(map(str, [len(p), *p])) + "\n" for p in POLYGONS)
     files = [header("ascii", fields | more) + text.encode()]
@@ -107,8 +109,8 @@ def _ply() -> list[bytes]:
     plain = b"".join(struct.pack("<3f", *p) for p in POINTS)
     plain += b"".join(struct.pack(f"<I{len(p)}H", len(p), *p) for p in POLYGONS)
     files.append(header("binary_little_endian", fields, "uint", "ushort") + plain)
-    strips = [[0, 1, 7, -1], [7, 6, 0, 1, -1]]
-    body = struct.pack("<I9i", 9, *strips[0], *strips[1])
+    strip = [6, 0, 7, 1, 8, 2, 9, 3, -1, 9, 3, 10, 4, 11, 5, 6, 0]  # the walls
+    body = struct.pack(f"<I{len(strip)}i", len(strip), *strip)
     points = b"".join(struct.pack("<3f", *p) for p in POINTS)
     head = header("binary_little_endian", fields).replace(
         b"element face 8\nproperty list uchar int vertex_indices",
@@ -340,6 +342,14 @@ def _transfer() -> list[bytes]:
     return files
 
 
+# What a file may name, beside it.
+BESIDE = {
+    "obj": {
+        "scene.mtl": b"newmtl red\nKd 1 0 0\nmap_Kd red.png\nnewmtl blue\nKd 0 0 1\nd 0.5\n",
+        "red.png": _PNG,
+    }
+}
+
 _MAKERS = {
     "obj": _obj,
     "ply": _ply,
@@ -354,6 +364,12 @@ _MAKERS = {
 }
 FORMATS = tuple(_MAKERS)
 MESHES, PICTURES = FORMATS[:5], FORMATS[5:9]
+
+
+def put_beside(kind: str, folder: Path) -> None:
+    """Write what the files of a format name into their folder."""
+    for name, data in BESIDE.get(kind, {}).items():
+        (folder / name).write_bytes(data)
 
 
 @functools.cache

@@ -93,17 +93,17 @@ def check(kind: str, path: Path) -> Outcome:
     for one in met:
         if one.category is not UserWarning:
             raise Fault(f"{one.category.__name__}: {one.message} ({one.filename}:{one.lineno})")
-        _check_words(str(one.message), path)
+        _check_words(str(one.message), path, 700)
     if result is not None:
         _check_result(kind, result)
     return Outcome(result, bool(met))
 
 
-def _check_words(message: str, path: Path) -> None:
+def _check_words(message: str, path: Path, most: int = 400) -> None:
     rest = message.replace(str(path), "", 1)
     if rest == message:
         raise Fault(f"does not name the file: {message}")
-    if len(rest) > 400 or not rest.isprintable():
+    if len(rest) > most or not rest.isprintable():
         raise Fault(f"is no sentence: {message[:1000]!r}")
 
 

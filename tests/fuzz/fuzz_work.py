@@ -8,7 +8,7 @@ from pathlib import Path
 from random import Random
 
 from fuzz_changes import change
-from fuzz_files import seeds
+from fuzz_files import put_beside, seeds
 
 HANGS = 30.0  # seconds after which a process that is at one input is killed
 STARTING, READING, COMPARING, DONE = range(4)
@@ -32,6 +32,7 @@ def work(kind, seed, indices, at, stage, found, peers) -> None:
     memory = "/dev/shm"  # where files are in memory, on Linux
     with tempfile.TemporaryDirectory(dir=memory if os.path.isdir(memory) else None) as folder:
         path = Path(folder) / f"input.{kind}"
+        put_beside(kind, path.parent)
         path.write_bytes(seeds(kind)[0])
         check(kind, path)  # what is loaded or compiled once counts against no input
         for index in indices:
