@@ -103,6 +103,12 @@ def test_the_display_window_is_the_picture(tmp_path, rng):
         read_environment(path, repair=True)
 
 
+def test_a_window_far_larger_than_the_picture_is_not_filled(tmp_path, picture):
+    path = save(tmp_path / "a.exr", picture, full_x=0, full_y=0, full_width=320, full_height=160)
+    with pytest.raises(ValueError, match=r"a\.exr: only 16 × 8 pixels of 320 × 160 are stored"):
+        read_environment(path, repair=True)
+
+
 def test_a_layer_alone_needs_no_name_and_two_do(tmp_path, picture):
     names = ["beauty.R", "beauty.G", "beauty.B", "beauty.A"]
     alpha = np.concatenate([picture, picture[..., :1]], axis=-1)

@@ -15,6 +15,8 @@ from ._window import fit_window
 # The best that the compression of these formats can do is some hundred numbers in a byte.
 _MAX_NUMBERS_PER_BYTE = 2048
 _MAX_PIXELS = 1 << 28  # 3 GB of them
+# A picture that is nearly all black by default was damaged more likely than saved so.
+_MAX_FILLED = 64
 _ENVMAPS = {"CubeFace Environment": "cube", "LatLong Environment": "lat-long"}
 
 
@@ -50,8 +52,11 @@ def read_exr(path: Path, layer: str | None, fill: bool) -> Picture:
     layout = _ENVMAPS.get(spec.getattribute("textureformat"))
     if layout is None:
         window = (spec.y, spec.x), (spec.full_y, spec.full_x, spec.full_height, spec.full_width)
-        if spec.full_height * spec.full_width > _MAX_PIXELS:
-            raise ValueError(f"a picture of {spec.full_width} × {spec.full_height} is too large")
+        if spec.full_height * spec.full_width > _MAX_FILLED * spec.height * spec.width:
+            raise ValueError(
+                f"only {spec.width} × {spec.height} pixels of {spec.full_width} × "
+                f"{spec.full_height} are stored"
+            )
         pixels = fit_window(pixels, *window, fill)
     return Picture(np.broadcast_to(pixels, (*pixels.shape[:2], 3)), layout)
 
