@@ -122,10 +122,12 @@ def test_lists_strips_and_fans(dtype, indexed, mode, order, faces):
         assert any((np.roll(triangle, turn, axis=0) == face).all() for turn in range(3))
 
 
-def test_unused_vertices_are_no_finding():
+@pytest.mark.parametrize("others", [3, 60])
+def test_unused_vertices_are_no_finding(others):
     # Primitives often share one list of vertices.
     gltf = Gltf()
-    gltf.mesh(np.concatenate([np.full((3, 3), np.nan), CORNERS]).astype(np.float32), FACES + 3)
+    corners = np.concatenate([np.full((others, 3), np.nan), CORNERS])
+    gltf.mesh(corners.astype(np.float32), (FACES + others).astype(np.uint16))
     polygons = read(gltf, {})
     assert polygons.positions.shape == (4, 3)
     np.testing.assert_array_equal(triangles(polygons), CORNERS[FACES])

@@ -64,7 +64,8 @@ def _placed(document: Document, materials: Materials, placement: Placement) -> I
 def _copied(part: Part, matrices: Float[np.ndarray, "k 4 4"]) -> Part:
     count, size = len(matrices), len(part.positions)
     linear = matrices[:, :3, :3]
-    positions = part.positions @ linear.transpose(0, 2, 1) + matrices[:, None, :3, 3]
+    # `einsum` is several times faster here than `@`.
+    positions = np.einsum("nj,kij->kni", part.positions, linear) + matrices[:, None, :3, 3]
     cofactors, mirrored = _cofactors(linear)
     faces = np.repeat(part.faces[None], count, axis=0)
     # The specification turns mirrored faces, so that they stay counter-clockwise from outside.
@@ -72,7 +73,7 @@ def _copied(part: Part, matrices: Float[np.ndarray, "k 4 4"]) -> Part:
     faces += size * np.arange(count)[:, None, None]
     normals = part.normals
     if normals is not None:
-        normals = (normals @ cofactors.transpose(0, 2, 1)).reshape(-1, 3)
+        normals = np.einsum("nj,kij->kni", normals, cofactors).reshape(-1, 3)
 
     def tiled(rows):
         return None if rows is None else np.tile(rows, (count, 1))
@@ -115,11 +116,12 @@ def _skinned(document: Document, part: Part, placement: Placement) -> Part:
             blend += share[:, None, None] * matrices[joint]
         blend = np.where(loose[block, None, None], placement.matrices[0], blend)
         linear = blend[:, :3, :3]
-        positions[block] = (linear @ part.positions[block, :, None])[..., 0] + blend[:, :3, 3]
+        positions[block] = np.einsum("nij,nj->ni", linear, part.positions[block])
+        positions[block] += blend[:, :3, 3]
         cofactors, mirrored = _cofactors(linear)
         sign[block] = np.where(mirrored, -1, 1)
         if normals is not None and stored is not None:
-            normals[block] = (cofactors @ stored[block, :, None])[..., 0]
+            normals[block] = np.einsum("nij,nj->ni", cofactors, stored[block])
     faces = np.where(
         sign[part.faces].sum(axis=1, keepdims=True) < 0, part.faces[:, ::-1], part.faces
     )
@@ -148,10 +150,12 @@ def _joined(parts: list[Part], materials: Materials, found: tuple[str, ...]) -> 
     def joined(rows: list[np.ndarray | None], width: int) -> np.ndarray | None:
         if all(row is None for row in rows):
             return None
-        out = np.full((ends[-1], width), np.nan)
+        out = np.empty((ends[-1], width))
         for row, part, start in zip(rows, parts, ends, strict=False):
-            if row is not None:
-                place = out[start : start + part.faces.size]
+            place = out[start : start + part.faces.size]
+            if row is None:
+                place[:] = np.nan
+            else:
                 # No vertex is out of range: "clip" only spares a copy.
                 np.take(row, part.faces.ravel(), axis=0, out=place, mode="clip")
         return out

@@ -77,8 +77,7 @@ def _read_part(
         document.note("primitives without a triangle ignored")
         return None
     document.spend(faces.size)
-    # Primitives often share one long list of vertices.
-    used, renumbered = np.unique(faces, return_inverse=True)
+    used, renumbered = _used(faces, vertices.count)
 
     number = primitive.get("material")
     row = -1 if number is None else materials.row(whole(primitive, "material", owner), owner)
@@ -98,7 +97,7 @@ def _read_part(
     joints, shares = _influences(vertices, used)
     return Part(
         values["POSITION"],
-        renumbered.reshape(-1, 3),
+        renumbered,
         row,
         values.get("NORMAL"),
         None if uv is None else materials.place_uv(row, uv),
@@ -174,6 +173,18 @@ def _faces(corners: Integer[np.ndarray, " n"], mode: int, owner: str) -> Integer
     faces = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
     faces[1::2, 1:] = faces[1::2, :0:-1]
     return faces
+
+
+def _used(
+    faces: Integer[np.ndarray, "t 3"], count: int
+) -> tuple[Integer[np.ndarray, " n"], Integer[np.ndarray, "t 3"]]:
+    """Give the vertices that faces use, in order, and the faces in terms of them."""
+    if count > 4 * faces.size:  # primitives often share one long list of vertices
+        used, renumbered = np.unique(faces, return_inverse=True)
+        return used, renumbered.reshape(-1, 3)
+    marked = np.zeros(count, bool)
+    marked[faces] = True
+    return np.flatnonzero(marked), (np.cumsum(marked) - 1)[faces]
 
 
 def _morph(
