@@ -133,6 +133,8 @@ def _from_file(given: np.ndarray, whole: Clean) -> tuple[np.ndarray, list[str]]:
         good = np.isfinite(largest) & (largest > 0)
         scaled = given / np.where(good, largest, 1)[..., None]
         unit = scaled / np.where(good, np.linalg.norm(scaled, axis=2), 1)[..., None]
+        # Of length 1 to float32's rounding: kept to the bit.
+        unit = np.where(np.abs(unit - given).max(axis=2, keepdims=True) < 1e-6, given, unit)
     if not good.all():
         knots, smooth = _knots(whole, "smooth")
         unit = np.where(good[..., None], unit, np.asarray(smooth)[knots])

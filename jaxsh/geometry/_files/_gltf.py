@@ -180,4 +180,6 @@ def _unit(normals: Float[np.ndarray, "n 3"] | None) -> Float[np.ndarray, "n 3"] 
         return None
     # First by the largest component: squares of very long or short ones leave the range.
     scaled = normals / np.abs(normals).max(axis=1, keepdims=True, initial=0)
-    return scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+    unit = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+    # Of length 1 to float32's rounding: kept to the bit.
+    return np.where(np.abs(unit - normals).max(axis=1, keepdims=True) < 1e-6, normals, unit)

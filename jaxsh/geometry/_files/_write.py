@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from ..._core.checks import as_path, check_choice, check_type
 from .._mesh import Mesh
 from ._write_arrays import Arrays, has, on_host, problem, turned_to_y
 from ._write_glb import glb_files
@@ -64,12 +65,13 @@ def write_mesh(
     ...     bool((geometry.read_mesh(path).vertices == knot.vertices).all())
     True
     """
-    path = Path(path)
+    path = as_path(path)
+    check_type("mesh", mesh, Mesh)
     suffix = path.suffix.lower()
     if suffix not in _FORMATS:
         raise ValueError(f"{path}: cannot write {suffix or 'no extension'}, only {tuple(_FORMATS)}")
-    if up not in ("z", "y", None):
-        raise ValueError(f'up must be "z", "y" or None, got {up!r}')
+    if up is not None:
+        check_choice("up", up, ("z", "y"))
     arrays, form = on_host(mesh), _FORMATS[suffix]
     if reason := problem(arrays):
         raise ValueError(f"{path}: cannot be written: {reason}")

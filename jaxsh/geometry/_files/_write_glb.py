@@ -106,21 +106,20 @@ def _by_material(arrays: Arrays) -> list[tuple[int, np.ndarray]]:
 
 
 def _materials(materials: tuple[BaseColor, ...], buffer: _Buffer) -> dict[str, Any]:
-    """Describe materials, and put their textures into the buffer."""
+    """Describe materials, and put their textures into the buffer.
+
+    Alpha is kept, but nothing says that it cuts out or blends: a `BaseColor` does not.
+    """
     described, images = [], []
     for material in materials:
         # Nothing here is metal, which glTF takes a material for that does not say so.
         factor = [float(one) for one in material.factor]
         surface: dict[str, Any] = {"baseColorFactor": factor, "metallicFactor": 0}
-        alpha = factor[3]
         if material.texture is not None:
-            texture = np.asarray(material.texture)
             surface["baseColorTexture"] = {"index": len(images)}
-            images.append({"bufferView": buffer.view(png(texture)), "mimeType": "image/png"})
-            alpha = min(alpha, float(texture[..., 3].min()) / 255)
+            view = buffer.view(png(np.asarray(material.texture)))
+            images.append({"bufferView": view, "mimeType": "image/png"})
         one: dict[str, Any] = {"name": material.name, "pbrMetallicRoughness": surface}
-        if alpha < 1:
-            one["alphaMode"] = "BLEND"
         if material.double_sided:
             one["doubleSided"] = True
         described.append(one)
