@@ -15,7 +15,13 @@ HOST = "runs in NumPy on the host, as its docstring says"
 ONE = "takes one picture, camera or mesh: nothing in it is shared out"
 REASONS = {
     "adaptive": {},
-    "geometry": {"ray_scene": HOST, "read_mesh": NO_ARRAYS, "write_mesh": NO_ARRAYS},
+    "geometry": {
+        "from_trimesh": HOST,
+        "ray_scene": HOST,
+        "read_mesh": NO_ARRAYS,
+        "to_trimesh": HOST,
+        "write_mesh": NO_ARRAYS,
+    },
     "harmonics": dict.fromkeys(
         ["degree_of", "degrees", "gaunt", "index", "num_coefficients", "orders", "window"],
         NO_ARRAYS,

@@ -17,6 +17,7 @@ from ._read import read_mesh
 from ._topology import Topology, neighbors, topology
 from ._trace import Trace, trace
 from ._tree import RayTree
+from ._trimesh import from_trimesh, to_trimesh
 
 __all__ = [
     "BaseColor",
@@ -28,11 +29,13 @@ __all__ = [
     "RayTree",
     "Topology",
     "Trace",
+    "from_trimesh",
     "knot",
     "make_mesh",
     "neighbors",
     "ray_scene",
     "read_mesh",
+    "to_trimesh",
     "topology",
     "trace",
     "vertex_normals",
