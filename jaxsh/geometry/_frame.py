@@ -48,10 +48,9 @@ class Frame(NamedTuple):
             moved = (positions.astype(np.float64) - self.center) * self.scale
             return moved.astype(np.float32)
 
-    def rounding(self, positions: Float[np.ndarray, "n 3"]) -> float:
+    def rounding(self, positions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
         """By how much positions are rounded within, at most, in the unit of the meshes."""
-        largest = np.abs(positions.astype(np.float64) - self.center).max(initial=0)
-        return float(np.finfo(np.float32).eps * largest)
+        return np.finfo(np.float32).eps * np.abs(positions - self.center).max(axis=1)
 
     def nearer(
         self, origins: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]

@@ -78,7 +78,7 @@ def test_equals_the_slow_twin(directions, tolerance):
     mesh = knot(400)
     vertices = [0, 57, 200, 311]
     twin = slow_twin(mesh, 3, directions, 5, vertices)
-    got = baked(mesh, 3, directions=directions, seed=5)[vertices]
+    got = baked(mesh, 3, directions=directions, seed=5, ray_bias=1e-4)[vertices]
     assert relative(baked(mesh, 3, shadows=False)[vertices], twin) > 0.1
     assert relative(got, twin) < tolerance
 
@@ -159,8 +159,9 @@ def test_vertices_that_see_nothing_or_have_no_normal_are_counted():
     faces = jnp.asarray(np.concatenate([fin, faces + 3, faces + 3 + len(outer)]))
     mesh = Mesh(points, faces, vertex_normals(points, faces))
     message = (
-        rf"bake: 3 of {len(vertices)} vertices have no normal .* and {len(outer)} of "
-        rf"{len(vertices)} vertices see nothing .*; they get no direct light"
+        rf"bake: 3 of {len(vertices)} vertices have no normal \(3 on faces that are there twice, "
+        rf"both ways round\) and {len(outer)} of {len(vertices)} vertices see nothing "
+        rf"\({len(outer)} behind faces of another piece, as inside it\); they get no direct light"
     )
     with pytest.warns(UserWarning, match=message):
         coefficients = baked(mesh, directions=128)
@@ -173,7 +174,8 @@ def test_vertices_that_see_nothing_or_have_no_normal_are_counted():
 @pytest.mark.parametrize("normal", [[0, 0, 0], [np.nan, 0, 1], [0, np.inf, 0]])
 def test_normals_by_hand_that_are_none_are_counted(normal):
     receivers = bodies.points([[0, 0, 0], [1, 0, 0]], [[0, 0, 3], normal])
-    with pytest.warns(UserWarning, match="1 of 2 vertices have no normal"):
+    message = "1 of 2 vertices have no normal .1 whose normal is zero, NaN or infinite"
+    with pytest.warns(UserWarning, match=message):
         coefficients = baked(receivers, shadows=False)
     exact = convolve(evaluate(jnp.array([0.0, 0, 1]), 4), clamped_cosine(4))
     np.testing.assert_allclose(coefficients, [exact, 0 * exact], atol=1e-6)

@@ -17,9 +17,9 @@ class Stopping:
     def __init__(self, after=10**9):
         self._scene, self.asked, self._after = ray_scene(MESH), 0, after
 
-    def occluded(self, origins, directions):
+    def occluded(self, origins, directions, max_distance=np.inf):
         self._count()
-        return self._scene.occluded(origins, directions)
+        return self._scene.occluded(origins, directions, max_distance)
 
     def closest_hit(self, origins, directions):
         self._count()

@@ -2,13 +2,15 @@
 
 import math
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ..._core.checks import check_size
 from ...geometry import Mesh
+from ._blind import why_undefined
 
 
 def check_arguments(
@@ -17,7 +19,8 @@ def check_arguments(
     shadows: bool,
     bounces: int,
     albedo: Any,
-    ray_bias: float,
+    ray_bias: float | None,
+    offset: float | None,
     chunk: int,
 ) -> None:
     """Raise `ValueError` that says which of `bake`'s arguments is wrong, and how."""
@@ -38,8 +41,11 @@ def check_arguments(
     check_size("chunk", chunk)
     if bounces and not shadows:
         raise ValueError(f"bounces={bounces} needs rays, and shadows=False casts none")
-    if not (math.isfinite(ray_bias) and ray_bias > 0):
-        raise ValueError(f"ray_bias must be finite and > 0, got {ray_bias!r}")
+    for name, value in (("ray_bias", ray_bias), ("offset", offset)):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise ValueError(f"{name} must be finite and > 0, got {value!r}")
+    if ray_bias is not None and offset is not None:
+        raise ValueError(f"expected ray_bias or offset, not both: got {ray_bias!r} and {offset!r}")
     share = np.asarray(albedo)
     if share.shape not in ((), (len(vertices),)):
         raise ValueError(
@@ -49,18 +55,25 @@ def check_arguments(
         raise ValueError("albedo must be finite and >= 0 everywhere")
 
 
-def report(normals: Float[np.ndarray, "v 3"], direct: Float[np.ndarray, "v k"]) -> None:
-    """Warn once, on behalf of `bake`, about vertices that no light reaches directly."""
-    undefined = ~normals.any(axis=1)
-    blind = ~direct.any(axis=1) & ~undefined
-    found = [
-        f"{count} of {len(direct)} vertices {what}"
-        for count, what in (
-            (int(undefined.sum()), "have no normal (it is zero or NaN, or their faces cancel)"),
-            (int(blind.sum()), "see nothing (all rays are blocked, as inside the mesh)"),
-        )
-        if count
-    ]
+def report(
+    mesh: Mesh,
+    normals: Float[np.ndarray, "v 3"],
+    direct: Float[np.ndarray, "v k"],
+    why: Callable[[Int[np.ndarray, " n"]], list[str]],
+) -> None:
+    """Warn once, on behalf of `bake`, about vertices that no light reaches directly.
+
+    `why` says why some vertices see nothing, and is asked only where there are any.
+    """
+    undefined = np.logical_not(normals.any(axis=1))
+    blind = np.logical_not(direct.any(axis=1)) & ~undefined
+    found = []
+    if count := int(undefined.sum()):
+        reasons = ", ".join(why_undefined(mesh, undefined))
+        found.append(f"{count} of {len(direct)} vertices have no normal ({reasons})")
+    if count := int(blind.sum()):
+        reasons = ", ".join(why(np.flatnonzero(blind)))
+        found.append(f"{count} of {len(direct)} vertices see nothing ({reasons})")
     if found:
         message = f"bake: {' and '.join(found)}; they get no direct light"
         warnings.warn(message, UserWarning, stacklevel=3)

@@ -1,0 +1,198 @@
+"""Origins of rays: a little off the surface, by as little as its coordinates allow."""
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ...geometry import Mesh, RayScene
+
+# In half-extents of the mesh. Measured on six scanned meshes: the error that the distance makes
+# falls with it down to 1e-5, where it is 0.02 to 0.2 %; 1e-4 makes 0.06 to 0.9 %.
+_SHARE = 1e-5
+# What a vertex's shortest edge allows, so that small parts of a large mesh keep their shadows.
+_OF_EDGE = 1e-3
+# In units of what coordinates are rounded to: a surface is uneven by about one.
+_ULPS = 4
+_LOUD = 0.1  # of a vertex's shortest edge; warned of where half of the vertices have more
+_SINGLE = float(np.finfo(np.float32).eps)
+
+
+class Origins(NamedTuple):
+    """Holds where the rays of V vertices start."""
+
+    positions: Float[np.ndarray, "v 3"]  # float32, or float64 where that is too coarse
+    distance: Float[np.ndarray, " v"]  # off the surface
+    least: Float[np.ndarray, " v"]  # that coordinates allow
+    chosen: bool  # by the user, so that it may pass the next surface
+
+
+def origins(
+    mesh: Mesh,
+    normals: Float[np.ndarray, "v 3"],
+    scene: RayScene,
+    ray_bias: float | None,
+    offset: float | None,
+) -> Origins:
+    """Take each vertex a little off the surface.
+
+    Vertices at a rim, also one where only the normals break, start as far inwards too, or they
+    would start within the plane of a surface that meets theirs there.
+    """
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    half = float(np.ptp(vertices.astype(np.float64), axis=0).max()) / 2
+    shortest, longest = _edges(vertices, faces)
+    least = _ULPS * _rounding(vertices, np.where(longest > 0, longest, 2 * half), scene)
+    automatic = offset is None and ray_bias is None
+    if automatic:
+        distance = np.maximum(np.minimum(_SHARE * half, _OF_EDGE * shortest), least)
+    else:
+        wanted = offset if offset is not None else (ray_bias or 0) * half
+        distance = np.maximum(wanted, least)
+    _warn_of_large(distance, shortest, least, vertices)
+
+    rim = _open(faces, len(vertices))
+    inwards = _inwards(vertices, faces, rim)
+    positions = vertices.astype(np.float64)
+
+    def lifted(by: Float[np.ndarray, " n"], at: slice | Int[np.ndarray, " n"]) -> np.ndarray:
+        start = positions[at] + by[:, None] * normals[at]
+        aside = np.minimum(by, shortest[at] / 10)
+        edge = rim[at]
+        start[edge] += aside[edge, None] * inwards[at][edge]
+        return start.astype(np.float32) if fits else start
+
+    # Whether the least distance is at least a few of the steps that float32 has there.
+    steps = _ULPS * _SINGLE * np.abs(vertices).max(axis=1)
+    fits = bool((steps <= least * (1 + 1e-6)).all())
+    if automatic:
+        distance = _within_gaps(scene, normals, distance, least, lifted)
+    return Origins(lifted(distance, slice(None)), distance, least, not automatic)
+
+
+def _rounding(
+    vertices: Float[np.ndarray, "v 3"], extent: Float[np.ndarray, " v"], scene: RayScene
+) -> Float[np.ndarray, " v"]:
+    """Give by how much each position is rounded: as the mesh stores it, and as rays are cast.
+
+    Rays are as inexact as float32 makes the faces around, whose `extent` is given.
+    """
+    largest, single = np.abs(vertices).max(axis=1).astype(np.float64), vertices.dtype == np.float32
+    if not single:  # most doubles have been single once
+        with np.errstate(over="ignore"):
+            single = bool((vertices.astype(np.float32) == vertices).all())
+    stored = (_SINGLE if single else float(np.finfo(np.float64).eps)) * largest
+    frame = getattr(scene, "frame", None)
+    if frame is None:
+        return np.maximum(stored, _SINGLE * np.maximum(extent, largest))
+    alone = frame.radius / frame.scale  # a single point has no extent of its own
+    cast = np.maximum(np.where(extent > 0, extent, alone) * _SINGLE, frame.rounding(vertices))
+    return np.maximum(stored, cast)
+
+
+def _within_gaps(scene: RayScene, normals, distance, least, lifted) -> np.ndarray:
+    """Halve the distance to what lies between a vertex and its origin."""
+    wide = np.flatnonzero((distance > least) & normals.any(axis=1))
+    if not len(wide):
+        return distance
+    start = lifted(least[wide], wide)
+    ahead = (distance[wide] - least[wide]).astype(np.float32)
+    stopped = scene.occluded(start, normals[wide], ahead)
+    if not stopped.any():
+        return distance
+    narrow = wide[stopped]
+    gap = scene.closest_hit(start[stopped], normals[narrow]).distance.astype(np.float64)
+    distance[narrow] = np.minimum(distance[narrow], least[narrow] + gap / 2)
+    return distance
+
+
+def _warn_of_large(distance, shortest, least, vertices) -> None:
+    """Warn, on behalf of `bake`, where origins are far off for how fine the mesh is."""
+    edged = np.isfinite(shortest) & (shortest > 0)
+    if not edged.any():
+        return
+    share = float(np.median(distance[edged] / shortest[edged]))
+    if share <= _LOUD:
+        return
+    off = float(np.median(distance[edged]))
+    if np.median(distance[edged] / least[edged]) < 1.01:
+        why = (
+            f"coordinates up to {np.abs(vertices).max():.3g} are rounded to {off / _ULPS:.2g}: "
+            "take an origin off them, in float64"
+        )
+    else:
+        why = "give a smaller ray_bias or offset"
+    message = (
+        f"bake: rays start {off:.2g} off the surface, {share:.2g} of a vertex's shortest edge (the "
+        f"median), so that finer shadows are lost: {why}"
+    )
+    warnings.warn(message, UserWarning, stacklevel=4)
+
+
+def _edges(
+    vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"]
+) -> tuple[Float[np.ndarray, " v"], Float[np.ndarray, " v"]]:
+    """Find the shortest edge, but those of no length, and the longest of the faces around a vertex.
+
+    Without any, infinite and zero.
+    """
+    points = np.ascontiguousarray(vertices.T, np.float64)
+    corners = [np.take(points, faces[:, corner], axis=1) for corner in range(3)]
+    shortest, longest = np.full(len(faces), np.inf), np.zeros(len(faces))
+    for one, two in ((0, 1), (1, 2), (2, 0)):
+        x, y, z = corners[two] - corners[one]
+        length = np.sqrt(x * x + y * y + z * z)
+        longest = np.maximum(longest, length)
+        length[length == 0] = np.inf
+        shortest = np.minimum(shortest, length)
+    least, most = np.full(len(vertices), np.inf), np.zeros(len(vertices))
+    for corner in range(3):
+        np.minimum.at(least, faces[:, corner], shortest)
+        np.maximum.at(most, faces[:, corner], longest)
+    return least, most
+
+
+def _open(faces: Int[np.ndarray, "f 3"], count: int) -> Bool[np.ndarray, " v"]:
+    """Tell which vertices faces do not surround.
+
+    Around a vertex the numbers of next and previous corners cancel but for the ends of its fan;
+    numbers are drawn at random, so that those of several fans do not cancel.
+    """
+    numbers = np.random.default_rng(0).integers(2**40, size=count).astype(np.float64)
+    ends = np.zeros(count)
+    for corner in range(3):
+        step = numbers[faces[:, corner - 2]] - numbers[faces[:, corner - 1]]
+        ends += np.bincount(faces[:, corner], step, minlength=count)
+    return ends != 0
+
+
+def _inwards(
+    vertices: Float[np.ndarray, "v 3"],
+    faces: Int[np.ndarray, "f 3"],
+    rim: Bool[np.ndarray, " v"],
+) -> Float[np.ndarray, "v 3"]:
+    """Point from vertices on a rim into their faces: the mean over the fan, at unit length."""
+    total, angle = np.zeros((len(vertices), 3)), np.zeros(len(vertices))
+    faces = faces[rim[faces].any(axis=1)]
+    if not len(faces):
+        return total
+    points = vertices.astype(np.float64)
+    for corner in range(3):
+        at = faces[:, corner]
+        sides = [points[faces[:, corner - k]] - points[at] for k in (1, 2)]
+        one, two = (_unit(side) for side in sides)
+        # The mean of directions between two, times the angle, is as long as what joins them.
+        width = np.linalg.norm(one - two, axis=1)
+        middle = width[:, None] * _unit(one + two)
+        for axis in range(3):
+            total[:, axis] += np.bincount(at, middle[:, axis], minlength=len(vertices))
+        angle += np.bincount(at, width, minlength=len(vertices))
+    # A fan that is nearly whole, as along a slit, has no inside.
+    sided = rim & (np.linalg.norm(total, axis=1) > 0.05 * angle)
+    return np.where(sided[:, None], _unit(total), 0)
+
+
+def _unit(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(length > 0, length, 1)

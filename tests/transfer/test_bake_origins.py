@@ -1,0 +1,261 @@
+"""The bake of meshes of any size, anywhere, and near other surfaces, against closed forms."""
+
+import warnings
+
+import bodies
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxsh.geometry import (
+    EmbreeRayScene,
+    JaxRayScene,
+    Mesh,
+    knot,
+    make_mesh,
+    ray_scene,
+    vertex_normals,
+)
+from jaxsh.harmonics import clamped_cosine, convolve, evaluate
+from jaxsh.transfer import bake
+
+DEGREE, RAYS = 4, 256  # of all bakes here: each other pair compiles anew
+
+
+def baked(mesh, **options):
+    options = {"directions": RAYS, "progress": False} | options
+    return np.asarray(bake(mesh, DEGREE, **options).coefficients)
+
+
+def irradiance(mesh, **options):
+    """Under a uniform sky, as a share of π."""
+    return baked(mesh, **options)[:, 0] * np.sqrt(4 * np.pi) / np.pi
+
+
+def unshadowed(mesh):
+    """λ_l y_lm(n), in blocks of one size: one program for all."""
+    normals = np.asarray(mesh.normals, np.float32)
+    padded = np.zeros((-(-len(normals) // 1024), 1024, 3), np.float32)
+    padded.reshape(-1, 3)[: len(normals)] = normals
+    rows = [convolve(evaluate(block, DEGREE), clamped_cosine(DEGREE)) for block in padded]
+    return np.concatenate(rows)[: len(normals)]
+
+
+def joined(*meshes) -> Mesh:
+    """One mesh of several, with the normals that each has: hard edges between them."""
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    return bodies.by_hand(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.faces + int(k) for mesh, k in zip(meshes, first, strict=False)]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+    )
+
+
+def moved(mesh, by, turn=None) -> Mesh:
+    turn = np.eye(3) if turn is None else turn
+    vertices = np.asarray(mesh.vertices, float) @ turn.T + by
+    return bodies.by_hand(vertices, mesh.faces, np.asarray(mesh.normals) @ turn.T)
+
+
+def box(low, high) -> Mesh:
+    """Six rectangles, each with its own corners and normals."""
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    sides = np.diag(high - low)
+    return joined(
+        *(
+            bodies.rectangle(*where)
+            for u, v in (sides[[0, 1]], sides[[1, 2]], sides[[2, 0]])
+            for where in ((high - u - v, u, v), (low, v, u))
+        )
+    )
+
+
+def ground(half: float) -> Mesh:
+    """A square in z = 0 of four triangles, whose last vertex is in the middle."""
+    corners = float(half) * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [0, 0, 0]])
+    return make_mesh(corners, np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]))
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    vertices, faces = bodies.sphere(24, 36, 0.999 * np.pi)
+    return bodies.by_hand(vertices, faces, vertices)
+
+
+@pytest.mark.parametrize("distance", [0, 1e2, 1e4, 1e5, 1e6])
+def test_a_sphere_far_away_sees_everything(sphere, distance):
+    """Also where float32 leaves little of its shape; 5 % of it was black at 1e4."""
+    mesh = moved(sphere, [distance, distance, 0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)  # 1.3e-7 measured
+
+
+@pytest.mark.parametrize("scale", [1e-30, 1e-18, 1e-9, 1e9, 1e18, 1e30])
+def test_a_sphere_of_any_size_sees_everything(sphere, scale):
+    mesh = Mesh(sphere.vertices * np.float32(scale), sphere.faces, sphere.normals)
+    np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)
+
+
+@pytest.mark.parametrize("kind", [EmbreeRayScene, JaxRayScene])
+def test_a_body_with_shadows_has_the_same_anywhere(kind):
+    """Powers of two change no bit; in float64, neither a shift nor a scale more than rounding."""
+    mesh = knot(300)
+    expected = baked(mesh, scene=kind(mesh))
+    for scale in (2.0**-80, 2.0**80):
+        other = Mesh(mesh.vertices * np.float32(scale), mesh.faces, mesh.normals)
+        np.testing.assert_array_equal(baked(other, scene=kind(other)), expected)
+    vertices, normals = np.asarray(mesh.vertices, float), jnp.asarray(mesh.normals, float)
+    for scale, shift in ((1e-18, 0.0), (1e18, 0.0), (1.0, 1e7), (1e-9, 1e-2)):
+        other = Mesh(jnp.asarray(vertices * scale + shift), mesh.faces, normals)
+        got = baked(other, scene=kind(other))
+        error = np.linalg.norm(got - expected, axis=1) / np.linalg.norm(expected, axis=1).mean()
+        # 1e-3 measured: one ray of about 80 that a vertex casts hits or misses.
+        assert (error > 2e-5).mean() < 0.1
+        assert error.max() < 0.05
+
+
+def test_a_sphere_in_doubles_sees_everything_anywhere(sphere):
+    vertices, normals = (jnp.asarray(x, float) for x in (sphere.vertices, sphere.normals))
+    mesh = Mesh(1e-3 * vertices + 1e7, sphere.faces, normals)
+    np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)
+
+
+def test_what_coordinates_lose_is_said():
+    vertices, faces = np.asarray(knot(300).vertices, float), np.asarray(knot(300).faces)
+    mesh = make_mesh(vertices + 1e5, faces)
+    message = (
+        r"rays start 0\.048 off the surface, 0\.\d+ of a vertex's shortest edge \(the median\), "
+        r".*: coordinates up to 1e\+05 are rounded to 0\.012: take an origin off them"
+    )
+    with pytest.warns(UserWarning, match=message):
+        baked(mesh)
+    # Doubles have what singles lose.
+    doubles = jnp.asarray(vertices + 1e5)
+    baked(Mesh(doubles, mesh.faces, vertex_normals(doubles, mesh.faces)))
+
+
+@pytest.mark.filterwarnings("ignore:bake. 1 of 9 vertices see nothing")
+@pytest.mark.parametrize("half", [50, 100, 4000])
+def test_a_sheet_above_a_ground_of_any_size_shades_it(half):
+    """8 mm above the middle; a default offset of 1e-4 half-extents gave E = 0, π and π."""
+    mesh = joined(bodies.rectangle([-0.5, -0.5, 8e-3], [1, 0, 0], [0, 1, 0]), ground(half))
+    got = irradiance(mesh)
+    # What is seen past the sheet is at most 8/500 above the horizon: less than 1e-3 of π.
+    np.testing.assert_allclose(got, [1] * 8 + [0], atol=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore:bake. 1 of 9 vertices see nothing")
+def test_a_chosen_offset_may_be_too_large_and_is_said():
+    """In the unit of the vertices, or as a share of the half extent."""
+    mesh = joined(bodies.rectangle([-0.5, -0.5, 8e-3], [1, 0, 0], [0, 1, 0]), ground(50))
+    for options, middle in (
+        ({"offset": 7e-3}, 0),
+        ({"offset": 9e-3}, 1),
+        ({"ray_bias": 7e-3 / 50}, 0),
+        ({"ray_bias": 9e-3 / 50}, 1),
+    ):
+        assert irradiance(mesh, **options)[-1] == pytest.approx(middle, abs=1e-3)
+    with pytest.warns(UserWarning, match="0.3 off the surface, 0.3 of .*: give a smaller ray_bias"):
+        irradiance(bodies.rectangle([0, 0, 0], [1, 0, 0], [0, 1, 0]), offset=0.3)
+    below = joined(ground(10), box([-1, -1, 1e-3], [1, 1, 2]))
+    message = (
+        "1 of 29 vertices see nothing .1 with rays that start beyond the next surface, up to 0.002"
+    )
+    with pytest.warns(UserWarning, match=message):
+        baked(below, offset=2e-3)
+
+
+def test_an_offset_below_rounding_is_raised_to_it():
+    """Alone on a surface, tilted, with an offset of nothing: not shadowed by the surface itself."""
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    sheet = moved(ground(1), [30, 20, 10], turn)
+    np.testing.assert_allclose(irradiance(sheet, offset=1e-12), 1, atol=1e-6)
+    one = bodies.points(np.asarray(sheet.vertices)[4:], np.asarray(sheet.normals)[4:])
+    np.testing.assert_allclose(irradiance(one, scene=ray_scene(sheet)), 1, atol=1e-6)
+
+
+def test_small_parts_of_a_large_mesh_keep_their_shadows():
+    """A knot of a centimeter beside a ground of a kilometer bakes as it does alone."""
+    small = Mesh(knot(300).vertices * np.float32(0.01), knot(300).faces, knot(300).normals)
+    mesh = joined(small, moved(ground(1000), [0, 0, -1000]))
+    got, alone = (baked(m, scene=ray_scene(small)) for m in (mesh, small))
+    error = np.linalg.norm(got[: len(alone)] - alone) / np.linalg.norm(alone)
+    assert error < 2e-3
+
+
+def test_cubes_with_hard_edges_see_the_whole_sky():
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    for cube in (box([-1] * 3, [1] * 3), moved(box([-1] * 3, [1] * 3), [3, 2, 1], turn)):
+        np.testing.assert_allclose(baked(cube), unshadowed(cube), atol=3e-7)
+
+
+def test_rooms_with_hard_edges_let_no_light_through():
+    """In a corner of three walls each wall's own vertex sees an octant: π/4. On an edge between
+    two, at the rim of both, it sees half of the sky but for what the third takes.
+    """
+    walls = [
+        bodies.rectangle([0, 0, 0], *sides)
+        for sides in (np.eye(3)[[0, 1]], np.eye(3)[[1, 2]], np.eye(3)[[2, 0]])
+    ]
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    for room in (joined(*walls), moved(joined(*walls), [0.3, 0.2, 0.1], turn)):
+        got = irradiance(room, directions=1024).reshape(3, 4)
+        np.testing.assert_allclose(got[:, 0], 1 / 4, atol=5e-3)  # 2e-3 measured
+        np.testing.assert_allclose(got[:, [1, 3]], 0.5666, atol=8e-3)
+
+
+def test_a_box_that_stands_on_a_ground():
+    """Its sides see half of the sky, also at their feet, and the ground beneath it nothing."""
+    mesh = joined(box([-1, -1, 0], [1, 1, 2]), ground(1e4))
+    with pytest.warns(UserWarning, match="1 of 29 .* see nothing .1 behind faces of another"):
+        got = irradiance(mesh)
+    sides = np.abs(np.asarray(mesh.normals)[:24, 2]) < 0.5
+    np.testing.assert_allclose(got[:24][sides], 0.5, atol=1.5e-2)  # 1.1e-2 measured
+
+
+def test_two_plates_take_what_lies_between_them():
+    """A plate sees another of half sides a and b, c above its middle (Howell's C-14): F of the
+    parts of its sky, 4 (A/√(1+A²) atan(B/√(1+A²)) + B/√(1+B²) atan(A/√(1+B²))) / 2π.
+    """
+    lower = bodies.points([[0, 0, 0], [0, 0, 0]], [[0, 0, 1]] * 2)
+    for a, b, c in ((1.0, 2.0, 0.5), (3.0, 1.0, 2.0), (1.0, 1.0, 1e-3)):
+        upper = bodies.rectangle([-a, -b, c], [2 * a, 0, 0], [0, 2 * b, 0])
+        x, y = a / c, b / c
+        r, s = np.sqrt(1 + x * x), np.sqrt(1 + y * y)
+        factor = 2 / np.pi * (x / r * np.arctan(y / r) + y / s * np.arctan(x / s))
+        for scale in (1e-18, 1.0, 1e18):
+            scene = ray_scene(Mesh(upper.vertices * np.float32(scale), upper.faces, upper.normals))
+            got = irradiance(lower, directions=1024, scene=scene)
+            np.testing.assert_allclose(got, 1 - factor, atol=4e-3)  # 2e-3 measured
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces"),
+    [
+        (np.eye(3), [[0, 1, 2]]),  # one triangle: all of it is rim
+        ([[0, 0, 0], [1, 0, 0], [0.5, 1e-5, 0], [0.5, -1, 0]], [[0, 1, 2], [0, 3, 1]]),  # a needle
+        ([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]),  # no area
+        ([[3, 0, 0]] * 3, [[0, 1, 2]]),  # no extent
+        ([[0, 0, 0]] * 3, [[0, 1, 2]]),
+        ([[7, 7, 7]], np.zeros((0, 3))),  # no face
+    ],
+)
+def test_meshes_of_little_see_everything(vertices, faces):
+    faces = np.asarray(faces, np.int32)
+    vertices = jnp.asarray(vertices, jnp.float32)
+    mesh = Mesh(vertices, jnp.asarray(faces), vertex_normals(vertices, jnp.asarray(faces)))
+    scene = ray_scene(bodies.rectangle([0, 0, -9], [1, 0, 0], [0, 1, 0]))
+    for options in ({}, {"scene": scene}) if len(faces) else ({"scene": scene},):
+        np.testing.assert_allclose(irradiance(mesh, **options), 1, atol=1e-6)
+
+
+def test_ray_bias_and_offset_exclude_each_other(unchecked):
+    with pytest.raises(ValueError, match=r"expected ray_bias or offset, not both: got 0\.1 and 1"):
+        bake(bodies.cube(), 1, ray_bias=0.1, offset=1)
+    for wrong in (0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="offset must be finite and > 0"):
+            bake(bodies.cube(), 1, offset=wrong)
