@@ -5,7 +5,8 @@
 # (lint, types), make docs (the pages, built strictly), make test-oldest (the oldest JAX that is
 # supported), make test-newest (the newest Python here, and its JAX), make test-minimal (without the
 # packages that only some functions need), make package (wheel and sdist), make bench (beside the
-# peers), make clean.
+# peers), make fuzz (changed files of every format, a million of each: FUZZ="--inputs 10000 --formats
+# obj glb" for fewer), make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -23,7 +24,7 @@ NUMERICAL := adaptive geometry harmonics inverse midrange sky sphere transfer
 # a plain pytest go without.
 QUICK_COMPILE ?= --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false
 
-.PHONY: reproduce test test-slow test-all test-oldest test-newest test-minimal check docs package bench clean
+.PHONY: reproduce test test-slow test-all test-oldest test-newest test-minimal check docs package bench fuzz clean
 
 # Groups of dependencies need pip >= 25.1.
 define environment
@@ -95,6 +96,11 @@ package: $(VENV)/installed
 
 bench: $(BENCH_VENV)/installed
 	$(BENCH_VENV)/bin/python -m benchmarks
+
+# Beside other readers, where there are wheels of them.
+fuzz: $(VENV)/installed
+	-$(bin)/python -m pip install --quiet --group fuzz
+	$(bin)/python tests/fuzz $(FUZZ)
 
 clean:
 	rm -rf $(VENV) $(BENCH_VENV) $(OLDEST_VENV) $(NEWEST_VENV) .cache dist results site

@@ -145,7 +145,7 @@ def _flat(kind: str, path: Path) -> bool:
         ring = polygons.positions[polygons.corners[start:end]]
         ring = ring - ring.mean(axis=0)
         extents = np.linalg.svd(ring, compute_uv=False)
-        if end - start > 3 and extents[2] > 1e-4 * extents[0]:
+        if end - start > 3 and extents[2] > 1e-4 * extents[1]:
             return False
     return True
 
