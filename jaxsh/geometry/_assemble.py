@@ -2,10 +2,12 @@
 
 import math
 import warnings
+from collections.abc import Sequence
 from typing import Literal
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from .._core.words import reason
 from ._clean import Clean, clean
@@ -14,7 +16,9 @@ from ._files._triangulate import triangulate
 from ._mesh import Mesh, vertex_normals
 from ._split import smooth_groups, split
 
-Origin = tuple[float, float, float]
+# A point given by the caller, and what decides over normals.
+Origin = Sequence[float | int] | np.ndarray | Array
+Normals = str | float | int
 
 # Coordinates are large where float32 rounds them by more than this share of the median edge.
 _LOST = 1e-3
@@ -22,7 +26,7 @@ _LOST = 1e-3
 _FAR = 8
 
 
-def check_options(normals: str | float, origin: object) -> None:
+def check_options(normals: Normals, origin: object) -> None:
     """Raise `ValueError` where an option of `read_mesh` or `make_mesh` is none."""
     if isinstance(normals, str):
         known = normals in ("file", "smooth")
@@ -46,7 +50,7 @@ def assemble(
     *,
     source: str,
     corners: bool,
-    normals: str | float = "file",
+    normals: Normals = "file",
     encoding: Literal["srgb", "linear"] = "srgb",
     origin: Origin | None = None,
     two_sided: bool = False,
@@ -63,7 +67,9 @@ def assemble(
     if origin is None:
         origin, phrase = _origin(polygons.positions, raw)
         found += phrase
-    positions = polygons.positions - np.asarray(origin, np.float64)
+    center = np.asarray(origin, np.float64)
+    with np.errstate(invalid="ignore"):
+        positions = polygons.positions - center
     split_up = (polygons.normals, polygons.uv, polygons.colors)
     apart = corners or any(attribute is not None for attribute in split_up)
     try:
@@ -107,11 +113,11 @@ def assemble(
         colors=None if colors is None else jnp.asarray(colors.reshape(-1, 4)[corner]),
         face_material=material,
         materials=polygons.materials,
-        origin=(float(origin[0]), float(origin[1]), float(origin[2])),
+        origin=(float(center[0]), float(center[1]), float(center[2])),
     )
 
 
-def _knots(whole: Clean, normals: str | float):
+def _knots(whole: Clean, normals: Normals):
     """Name for each corner the point whose faces share a normal, and give the normals there."""
     knots, vertices = whole.faces, whole.vertices
     if not isinstance(normals, str):
@@ -167,7 +173,9 @@ def _linear(colors: np.ndarray, encoding: str) -> np.ndarray:
     return np.concatenate([rgb, colors[..., 3:]], axis=2).astype(np.float32)
 
 
-def _origin(positions: np.ndarray, faces: np.ndarray) -> tuple[Origin, list[str]]:
+def _origin(
+    positions: np.ndarray, faces: np.ndarray
+) -> tuple[tuple[float, float, float], list[str]]:
     """Choose what to take off the coordinates: nothing, unless float32 would lose their shape."""
     used = np.zeros(len(positions), bool)
     used[faces] = True

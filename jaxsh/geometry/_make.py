@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from ._assemble import Origin, assemble, check_options
+from ._assemble import Normals, Origin, assemble, check_options
 from ._clean import check_arrays
 from ._files._polygons import Polygons
 from ._mesh import Mesh
@@ -13,7 +13,7 @@ def make_mesh(
     vertices: Float[Array | np.ndarray, "v 3"],
     faces: Int[Array | np.ndarray, "f 3"],
     *,
-    normals: str | float = "smooth",
+    normals: Normals = "smooth",
     origin: Origin | None = None,
     two_sided: bool = False,
 ) -> Mesh:

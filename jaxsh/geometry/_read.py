@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from .._core.words import reason
-from ._assemble import Origin, assemble, check_options
+from ._assemble import Normals, Origin, assemble, check_options
 from ._files._gltf import read_gltf
 from ._files._obj import read_obj
 from ._files._off import read_off
@@ -30,7 +30,7 @@ def read_mesh(
     path: str | os.PathLike[str],
     *,
     up: Literal["z", "y"] | None = None,
-    normals: str | float = "file",
+    normals: Normals = "file",
     colors: Literal["srgb", "linear"] | None = None,
     origin: Origin | None = None,
     two_sided: bool = False,

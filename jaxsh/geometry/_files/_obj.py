@@ -95,7 +95,6 @@ def _vertices(words: Words, lines: np.ndarray, found: list[str]):
     if not colored.any():
         return positions, None
     colors = np.full((len(positions), 4), np.nan)
-    colors[colored, 3] = 1
     colors[colored, :3] = numbers[begin[colored, None] + np.arange(3, 6)]
     alpha = widths == 7
     colors[alpha, 3] = numbers[begin[alpha] + 6]
