@@ -59,7 +59,7 @@ def assemble(
 
     `corners` as in `clean`, `encoding` that of the colors; the rest as in `read_mesh`.
     """
-    found = list(polygons.found)
+    found = [reason(phrase) for phrase in polygons.found]  # may hold names from the file
     slots, owner, crossed = triangulate(polygons.positions, polygons.corners, polygons.sizes)
     if crossed:
         found.append(f"{crossed} polygons that cross over themselves cut as well as can be")

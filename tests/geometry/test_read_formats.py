@@ -139,8 +139,8 @@ def test_obj_materials_and_pictures_are_those_beside_the_file(tmp_path):
     assert red.texture is lost.texture is nowhere.texture is None
     for phrase in (
         r"the picture 'C:\\textures\\none.png' is not there",
-        "materials nowhere are white, being in no file",
-        "map_bump, map_kd -o, map_kd -s of materials ignored",
+        "materials in no file are white (nowhere)",
+        "of materials ignored (map_bump map_kd -o map_kd -s)",
         "2 smoothing groups ignored",
         "1 lines ignored",
         "1 points ignored",
@@ -193,7 +193,7 @@ def test_ply_of_any_order_line_end_and_type(tmp_path, form, end):
     head = end.join(["ply", f"format {form} 1.0", *header, "end_header", ""]).encode()
     mesh, said = read(tmp_path / "a.ply", head + (body if order else body.encode()))
     assert said == (
-        "properties flags, area of faces ignored, 1 elements 'camera' ignored, 2 duplicate faces "
+        "properties of faces ignored (flags area), 1 elements 'camera' ignored, 2 duplicate faces "
         "dropped"
     )
     np.testing.assert_array_equal(mesh.vertices, SQUARE)

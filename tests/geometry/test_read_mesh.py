@@ -70,8 +70,7 @@ def test_obj_with_seams_polygons_groups_and_relative_indices(tmp_path):
     with pytest.warns(UserWarning, match="missing") as record:
         mesh = read_mesh(path)
     assert str(record[0].message) == (
-        f"{path}: the materials 'missing.mtl' are not there, materials a, b are white, being in no "
-        "file"
+        f"{path}: the materials 'missing.mtl' are not there, materials in no file are white (a b)"
     )
     corners = np.asarray(mesh.vertices)[mesh.faces]
     np.testing.assert_array_equal(corners[:, 0], [[0, 0, 0]] * 3)

@@ -52,9 +52,9 @@ class Materials:
     def table(self) -> tuple[BaseColor, ...]:
         """Give the materials that faces name, and say what of them is not read."""
         if self._missing:
-            self._found.append(f"materials {', '.join(self._missing)} are white, being in no file")
+            self._found.append(f"materials in no file are white ({' '.join(self._missing)})")
         if self._unread:
-            self._found.append(f"{', '.join(sorted(self._unread))} of materials ignored")
+            self._found.append(f"of materials ignored ({' '.join(sorted(self._unread))})")
         return tuple(self._colors.values())
 
     def _read(self, place: Path) -> None:

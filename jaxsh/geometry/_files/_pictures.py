@@ -7,6 +7,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from jaxtyping import UInt8
 
+from ..._core.words import reason
 from ._gltf_pictures import as_rgba
 
 # A byte seldom gives more than ten pixels; more are for plain pictures of moderate size.
@@ -46,6 +47,5 @@ def read_picture(path: Path, name: str, found: list[str]) -> UInt8[np.ndarray, "
             image.load()
             return as_rgba(image)
     except Exception as error:  # decoders may raise anything where a picture is damaged
-        reason = str(error).strip().split("\n")[0]
-        found.append(f"the picture {name!r} cannot be read ({reason})")
+        found.append(f"the picture {name!r} cannot be read ({reason(error)})")
         return None

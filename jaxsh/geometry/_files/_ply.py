@@ -194,4 +194,4 @@ def _materials(
 
 def _say_ignored(what: str, columns: Columns, used: set[str], found: list[str]) -> None:
     if ignored := [name for name in columns if name not in used]:
-        found.append(f"properties {', '.join(ignored)} of {what} ignored")
+        found.append(f"properties of {what} ignored ({' '.join(ignored)})")
