@@ -326,3 +326,29 @@ def test_buffers_without_bytes():
     gltf.entry("buffers", byteLength=72)
     with pytest.raises(ValueError, match="needs buffer 0, which has neither a uri nor a binary"):
         read(json.dumps(gltf.json).encode())
+
+
+def test_many_references_to_one_thing_do_not_take_long():
+    # Each node would read its mesh, skin or targets anew.
+    for skin, target, primitive in ((5000, 1, 1), (1, 5000, 1), (1, 1, 3000)):
+        gltf = Gltf(skins=[{"joints": [0] * skin}])
+        gltf.mesh(targets=[{}] * target)
+        gltf.json["meshes"][0]["primitives"] += [{"mode": 0, "attributes": {}}] * primitive
+        gltf.json["nodes"] = [{"mesh": 0, "skin": 0}] * 100
+        refuses(gltf, "out of proportion")
+
+
+def test_compressed_bytes_are_not_packed_twice():
+    gltf = tetrahedron()
+    packed = gltf.json["bufferViews"].pop(gltf.view(b"\xa0" + bytes(800)))  # 4096 times 0, 0, 0
+    packed.update(byteStride=12, count=4096, mode="ATTRIBUTES")
+    for copy in range(20):
+        view = gltf.entry("bufferViews", extensions={"EXT_meshopt_compression": packed})
+        about = {"componentType": 5126, "type": "VEC3", "count": 4096}
+        gltf.mesh(gltf.entry("accessors", bufferView=view, **about))
+        if copy == 0:
+            gltf.json["nodes"][0]["mesh"] = 1
+            assert len(read(gltf.glb()).sizes) == 4
+            del gltf.json["buffers"]  # which grow
+        gltf.entry("nodes", mesh=copy + 1)
+    refuses(gltf, "packs bytes that another bufferView packs as well")

@@ -65,13 +65,17 @@ class Document:
     def __init__(self, folder: Path, fields: Fields, chunk: memoryview | None, size: int):
         self.folder = folder
         self.fields = fields
-        self.size = size  # bytes read or decoded so far, of all files
+        self.size = size  # bytes read or unpacked so far, of all files
         self.views: dict[int, memoryview] = {}  # decompressed bufferViews
+        self.meshes: dict[int, Any] = {}  # bufferViews as Draco's meshes
         self.sparse: dict[int, np.ndarray] = {}  # accessors with their sparse part written in
         self._found: Counter[str] = Counter()
         self._chunk = chunk
         self._buffers: dict[int, memoryview] = {}
+        self._files: dict[str, bytes] = {}
         self._spent = 0
+        self._stored = size
+        self._packed = self._unpacked = 0
 
     def note(self, what: str, count: int = 1) -> None:
         """Count something that was not read."""
@@ -92,6 +96,18 @@ class Document:
                 f"its instances and primitives give {shown(self._spent)} corners or more, out of "
                 f"proportion to its {self.size} bytes (at most {most})"
             )
+
+    def unpack(self, packed: int, unpacked: int, owner: str) -> None:
+        """Count bytes that are about to be unpacked, and raise if they are out of proportion."""
+        self._packed += packed
+        self._unpacked += unpacked
+        if self._packed > self._stored:
+            raise ValueError(f"{owner} packs bytes that another bufferView packs as well")
+        if self._unpacked > 2**25 + 16 * self._packed:
+            raise ValueError(
+                f"{owner} announces {shown(unpacked)} bytes, out of proportion to its {packed}"
+            )
+        self.size += unpacked
 
     def item(self, kind: str, index: int, owner: str) -> Fields:
         """Take an entry of one of the lists at the top, such as "accessors"."""
@@ -135,6 +151,8 @@ class Document:
                 f"{owner} is at {shown(uri)}, and only files in the folder of the glTF file or "
                 "below are read"
             )
+        if path in self._files:
+            return self._files[path]
         try:
             there = (self.folder / path).is_file()
             data = (self.folder / path).read_bytes() if there else b""
@@ -143,6 +161,8 @@ class Document:
         if not there:
             raise ValueError(f"{owner} is in {shown(path)}, which is not there")
         self.size += len(data)
+        self._stored += len(data)
+        self._files[path] = data
         return data
 
 

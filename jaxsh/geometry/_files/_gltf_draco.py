@@ -1,5 +1,7 @@
 """Decode what KHR_draco_mesh_compression packs, with DracoPy."""
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Integer
 
@@ -24,7 +26,7 @@ def decode_draco(
         return {}, None
     position = document.item("accessors", whole(attributes, "POSITION", owner), owner)
     try:
-        import DracoPy
+        import DracoPy  # noqa: F401, used in `_decode`
     except ImportError:
         if position.get("bufferView") is not None:
             return {}, None
@@ -32,13 +34,11 @@ def decode_draco(
             f"{owner} is compressed by {_NAME}, which needs the package DracoPy "
             "(pip install jaxsh[draco])"
         ) from None
-    view, _ = view_bytes(document, whole(packed, "bufferView", owner), owner)
-    try:
-        mesh = DracoPy.decode(bytes(view))
-        corners = np.asarray(mesh.faces, np.int64).reshape(-1)
-        found = len(mesh.points)
-    except Exception as error:  # of any kind, where the bytes are damaged
-        raise ValueError(f"{owner} has damaged bytes of {_NAME}: {error}") from None
+    number = whole(packed, "bufferView", owner)
+    if number not in document.meshes:
+        document.meshes[number] = _decode(document, number, owner)
+    mesh, corners = document.meshes[number]
+    found = len(mesh.points)
     announced = whole(position, "count", owner)
     if found != announced or corners.max(initial=0) >= found:
         raise ValueError(
@@ -58,5 +58,19 @@ def decode_draco(
                 "components"
             )
         unpacked[name] = Accessor(data, flag(fields, "normalized", f"{name} of {owner}"))
-        document.size += data.nbytes
     return unpacked, corners
+
+
+def _decode(document: Document, number: int, owner: str) -> tuple[Any, Integer[np.ndarray, " c"]]:
+    import DracoPy
+
+    view, _ = view_bytes(document, number, owner)
+    document.unpack(len(view), 0, owner)
+    try:
+        mesh = DracoPy.decode(bytes(view))
+        corners = np.asarray(mesh.faces, np.int64).reshape(-1)
+        document.size += sum(stored["data"].nbytes for stored in mesh.attributes)
+        document.spend(len(mesh.points))
+    except Exception as error:  # of any kind, where the bytes are damaged
+        raise ValueError(f"{owner} has damaged bytes of {_NAME}: {error}") from None
+    return mesh, corners

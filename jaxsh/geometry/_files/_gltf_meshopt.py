@@ -28,11 +28,7 @@ def unpack(document: Document, packed: memoryview, fields: Fields, owner: str) -
     """Give the bytes of a compressed bufferView; `fields` are those of the extension."""
     count, stride = whole(fields, "count", owner), whole(fields, "byteStride", owner)
     mode, kind = text(fields, "mode", owner), text(fields, "filter", owner) or "NONE"
-    if count * stride > 2**25 + 64 * len(packed):
-        raise ValueError(
-            f"{owner} announces {shown(count)} elements of {shown(stride)} bytes, out of "
-            f"proportion to its {len(packed)} bytes"
-        )
+    document.unpack(len(packed), count * stride, owner)
     if kind != "NONE" and (mode != "ATTRIBUTES" or kind not in FILTERS):
         raise ValueError(f"{owner} has the filter {shown(kind)} in mode {shown(mode)}")
     data = bytes(packed)
@@ -51,7 +47,6 @@ def unpack(document: Document, packed: memoryview, fields: Fields, owner: str) -
         raise ValueError(f"{owner}: its compressed bytes break off") from None
     except ValueError as error:
         raise ValueError(f"{owner}: its compressed bytes are damaged: {error}") from None
-    document.size += values.nbytes
     return memoryview(values.tobytes())
 
 

@@ -38,7 +38,9 @@ def read_parts(
     if weights is None:
         weights = numbers(fields, "weights", name, None, [])
     parts = []
-    for number, primitive in enumerate(listed(fields, "primitives", name)):
+    primitives = listed(fields, "primitives", name)
+    document.spend(64 * len(primitives))  # many nodes may show one mesh
+    for number, primitive in enumerate(primitives):
         title = f"primitive {number} of {name}"
         if not isinstance(primitive, dict):
             raise ValueError(f"{title} should be an object, got {shown(primitive)}")
@@ -200,6 +202,7 @@ def _morph(
     targets = listed(primitive, "targets", owner)
     if targets and weights and len(targets) != len(weights):
         raise ValueError(f"{owner} has {len(targets)} morph targets, but {len(weights)} weights")
+    document.spend(64 * len(targets))
     for number, (weight, target) in enumerate(zip(weights, targets, strict=False)):
         if weight == 0:
             continue

@@ -229,6 +229,7 @@ def _joint_matrices(
         raise ValueError(f"{name} has no joints")
     if max(joints) >= len(world):
         raise ValueError(f"{name} names node {shown(max(joints))}, but there are {len(world)}")
+    document.spend(64 * len(joints))  # many nodes may have one skin
     if fields.get("inverseBindMatrices") is None:
         return world[joints]
     title = f"inverseBindMatrices of {name}"
