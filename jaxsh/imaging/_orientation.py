@@ -67,8 +67,8 @@ def turn_columns(
 ) -> Float[np.ndarray, "h w 3"]:
     """Bring the columns of a lat-long picture into our order: flipped, rolled, never resampled.
 
-    A roll by half a column, which a quarter turn of an odd number of rows asks for, gives each
-    pixel the mean of the two that it overlaps: the integral stays, detail is lost.
+    A roll by a part of a column, as a quarter turn of an odd number of rows asks for, gives each
+    pixel its shares of the two that it overlaps: the integral stays, detail is lost.
     """
     width = image.shape[1]
     right, forward = (np.arctan2(axis[1], axis[0]) for axis in (axes[0], axes[2]))
@@ -78,6 +78,7 @@ def turn_columns(
     columns = width * (forward - np.pi) / (2 * np.pi)
     whole = int(np.floor(columns + 1e-6))
     rolled = np.roll(image, whole, axis=1) if whole % width else image
-    if columns - whole < 0.25:
+    part = np.float32(columns - whole)
+    if part < 1e-3:
         return rolled
-    return rolled / 2 + np.roll(rolled, 1, axis=1) / 2
+    return rolled * (1 - part) + np.roll(rolled, 1, axis=1) * part

@@ -116,6 +116,18 @@ def test_a_quarter_turn_of_odd_rows_is_by_half_a_column(tmp_path, rng, orientati
     np.testing.assert_allclose(image, exact[::2].reshape(5, 10, 2, 3).mean(axis=2), rtol=1e-6)
 
 
+def test_a_column_more_or_less_is_no_harm(tmp_path, rng):
+    """Pixels are then not square; a quarter turn is by a quarter of a column more."""
+    picture = rng.uniform(size=(64, 129, 3)).astype(np.float32)
+    path = save(tmp_path / "a.npy", picture)
+    np.testing.assert_array_equal(read_environment(path), picture)
+    image = np.asarray(read_environment(path, orientation="mitsuba"))
+    # Each of our pixels is the mean over the four quarters that it covers of the file's.
+    quarters = np.repeat(picture[:, ::-1], 4, axis=1)  # φ falls to the right
+    quarters = np.roll(quarters, 129, axis=1)  # the left edge's φ, ½ π
+    np.testing.assert_allclose(image, quarters.reshape(64, 129, 4, 3).mean(axis=2), atol=1e-6)
+
+
 def test_height_is_the_readers_choice(tmp_path, rng):
     picture = rng.uniform(1, 2, size=(32, 64, 3))
     path = save(tmp_path / "a.npy", picture)
