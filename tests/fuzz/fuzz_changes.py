@@ -10,6 +10,7 @@ import json
 import re
 import struct
 import zipfile
+import zlib
 from random import Random
 
 import numpy as np
@@ -260,8 +261,11 @@ def _edit_tree(tree, rng: Random) -> None:
 def _edit_json(data: bytes, rng: Random, kind: str) -> bytes:
     """Change the JSON of a GLB, and give the container the lengths that it then has."""
     try:
-        length = int.from_bytes(data[12:16], "little")
-        tree, rest = json.loads(data[20 : 20 + length]), data[20 + length :]
+        if kind == "gltf":
+            tree, rest = json.loads(data), b""
+        else:
+            length = int.from_bytes(data[12:16], "little")
+            tree, rest = json.loads(data[20 : 20 + length]), data[20 + length :]
         for _ in range(rng.choice([1, 1, 2, 4])):
             _edit_tree(tree, rng)
         text = json.dumps(tree).encode()
@@ -269,6 +273,8 @@ def _edit_json(data: bytes, rng: Random, kind: str) -> bytes:
         return data
     if rng.random() < 0.01:  # deeper than any parser that calls itself likes
         text = text[:-1] + b', "x": ' + b"[" * 100000 + b"]" * 100000 + b"}"
+    if kind == "gltf":
+        return text
     text += b" " * (-len(text) % 4)
     head = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON")
     return head + text + rest
@@ -295,6 +301,26 @@ def _edit_chunks(data: bytes, rng: Random, kind: str) -> bytes:
             chunks[i] = chunks[i][:4] + rng.choice([b"BIN\0", b"JSON", b"XYZ\0"]) + chunks[i][8:]
     body = b"".join(chunks)
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def _edit_png(data: bytes, rng: Random, kind: str) -> bytes:
+    """Change the header of a PNG, or what it packs, and give each chunk its right check sum."""
+    chunks, at = [], 8
+    while at + 12 <= len(data):
+        size = int.from_bytes(data[at : at + 4], "big")
+        chunks.append([data[at + 4 : at + 8], data[at + 8 : at + 8 + size]])
+        at += 12 + size
+    if not chunks:
+        return data
+    one = rng.choice(chunks[:1] * 3 + chunks)
+    one[1] = rng.choice(_BYTES)(one[1], rng, kind)
+    if rng.random() < 0.2:
+        chunks.insert(rng.randrange(len(chunks) + 1), rng.choice(chunks))
+    parts = [
+        struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+        for name, body in chunks
+    ]
+    return data[:8] + b"".join(parts)
 
 
 _DTYPES = [
@@ -362,9 +388,13 @@ _CHANGES = {
     "ply": _MIXED + _TEXT,
     "stl": _MIXED,
     "glb": [*_BYTES, *[_edit_json] * 16, *[_edit_chunks] * 2],
+    "gltf": [*_BYTES, *_TEXT, *[_edit_json] * 16],
     "hdr": _MIXED,
     "exr": [*_BYTES, _swap_number],
     "pfm": _MIXED,
+    "png": [*_BYTES, _edit_png],
+    "jpg": _BYTES,
+    "tif": [*_BYTES, _put_number, _put_number],
     "npy": [*_BYTES, *[_edit_npy] * 8],
     "npz": [*_BYTES, *[_edit_archive] * 12],
 }

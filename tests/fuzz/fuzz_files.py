@@ -1,5 +1,6 @@
 """Small valid files of every format that is read, as bytes: what the fuzzer starts from."""
 
+import base64
 import functools
 import io
 import json
@@ -206,7 +207,49 @@ def _glb() -> list[bytes]:
         "nodes": [{"mesh": 0}, {"mesh": 1, "translation": [9, 0, 0]}],
         "meshes": [{"primitives": [one]} for one in modes],
     }
-    return [glb(one, body) for one in (content, full, lifted, strips)]
+    files = [glb(one, body) for one in (content, full, lifted, strips)]
+    return files + _packed_glb(turned)
+
+
+def _packed_glb(points: np.ndarray) -> list[bytes]:
+    """Give GLB files compressed by meshoptimizer, and by Draco where it is installed."""
+    from gltf_writer import Gltf
+    from test_gltf_packed import GRID, accessor, packed
+
+    one = Gltf(extensionsRequired=["EXT_meshopt_compression"])
+    view = packed(one, "floats 0", 49, 12, "ATTRIBUTES")
+    one.mesh(accessor(one, view, 49, 5126, "VEC3"), np.uint8(GRID))
+    one.json["buffers"] = [{"byteLength": len(one.bytes)}, {"byteLength": 10**4}]
+    files = [one.glb({})]
+    try:
+        import DracoPy
+    except ImportError:
+        return files
+    one = Gltf(extensionsRequired=["KHR_draco_mesh_compression"])
+    data = DracoPy.encode(points.astype("f4"), TRIANGLES.astype("u4"), quantization_bits=16)
+    view = one.view(data)
+    points_at = one.entry("accessors", count=12, componentType=5126, type="VEC3")
+    corners_at = one.entry("accessors", count=TRIANGLES.size, componentType=5125, type="SCALAR")
+    extension = {"bufferView": view, "attributes": {"POSITION": 0}}
+    primitive = {
+        "attributes": {"POSITION": points_at},
+        "indices": corners_at,
+        "extensions": {"KHR_draco_mesh_compression": extension},
+    }
+    one.entry("meshes", primitives=[primitive])
+    return [*files, one.glb({})]
+
+
+def _gltf() -> list[bytes]:
+    """Give the first GLB files as JSON, their buffers in it."""
+    files = []
+    for data in seeds("glb")[:4]:
+        size = int.from_bytes(data[12:16], "little")
+        content = json.loads(data[20 : 20 + size])
+        buffer = base64.b64encode(data[28 + size :]).decode()
+        content["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{buffer}"
+        files.append(json.dumps(content, indent=1).encode())
+    return files
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:
@@ -264,6 +307,38 @@ def _exr() -> list[bytes]:
             out.close()
             files.append(Path(path).read_bytes())
     return files
+
+
+def codes() -> np.ndarray:
+    """A picture (8, 16, 3) of 8-bit codes."""
+    i, j, c = np.meshgrid(np.arange(HEIGHT), np.arange(WIDTH), np.arange(3), indexing="ij")
+    return (20 + 10 * i + 5 * j + 40 * c).astype(np.uint8)
+
+
+def _display(suffix: str, *options: dict) -> list[bytes]:
+    """Write the picture of codes by Pillow."""
+    from PIL import Image
+
+    files = []
+    for one in options:
+        out, image = io.BytesIO(), Image.fromarray(codes())
+        if "mode" in one:
+            image = image.convert(one["mode"])
+        image.save(out, suffix, **{key: value for key, value in one.items() if key != "mode"})
+        files.append(out.getvalue())
+    return files
+
+
+def _png() -> list[bytes]:
+    return _display("png", {}, {"mode": "L"}, {"mode": "P"}, {"mode": "RGBA"})
+
+
+def _jpg() -> list[bytes]:
+    return _display("jpeg", {"quality": 95}, {"mode": "L"}, {"progressive": True})
+
+
+def _tif() -> list[bytes]:
+    return _display("tiff", {}, {"compression": "tiff_lzw"}, {"compression": "tiff_adobe_deflate"})
 
 
 def _pfm() -> list[bytes]:
@@ -356,14 +431,18 @@ _MAKERS = {
     "stl": _stl,
     "off": _off,
     "glb": _glb,
+    "gltf": _gltf,
     "hdr": _hdr,
     "exr": _exr,
     "pfm": _pfm,
     "npy": _npy,
+    "png": _png,
+    "jpg": _jpg,
+    "tif": _tif,
     "npz": _transfer,
 }
 FORMATS = tuple(_MAKERS)
-MESHES, PICTURES = FORMATS[:5], FORMATS[5:9]
+MESHES, PICTURES, CODES = FORMATS[:6], FORMATS[6:13], FORMATS[10:13]
 
 
 def put_beside(kind: str, folder: Path) -> None:

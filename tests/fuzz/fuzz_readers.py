@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from fuzz_files import MESHES, PICTURES
+from fuzz_files import CODES, MESHES, PICTURES
 
 from jaxsh import geometry, imaging, transfer
 from jaxsh.geometry import _assemble
@@ -49,14 +49,15 @@ def read(kind: str, path: Path):
     if kind in MESHES:
         return geometry.read_mesh(path)
     if kind in PICTURES:
+        encoding = "srgb" if kind in CODES else None
         try:
-            return imaging.read_environment(path)
+            return imaging.read_environment(path, encoding=encoding)
         except ValueError as error:
             if "repair=True" not in str(error):
                 raise
             _check_words(str(error), path)
             warnings.warn(f"{path}: repaired", UserWarning, stacklevel=2)
-        return imaging.read_environment(path, repair=True)
+        return imaging.read_environment(path, encoding=encoding, repair=True)
     return transfer.load(path)
 
 
