@@ -55,9 +55,9 @@ def read_environment(
     default they are those that an OpenEXR file names in its attribute `envmap`, and without one
     "lat-long" and "jaxsh":
 
-    - "lat-long", 2 : 1 to 1 %: "jaxsh"; "mitsuba", "nvdiffrec" (y-up, turned as in `read_mesh(up="y")`);
-      "blender"; "debevec" (a panorama seen from inside, its center at -x); "openexr" (as
-      "mitsuba", its outermost pixels centered on the poles and on the seam).
+    - "lat-long", 2 : 1 to 1 %: "jaxsh"; "mitsuba", "nvdiffrec" (y-up, turned as in
+      `read_mesh(up="y")`); "blender"; "debevec" (a panorama seen from inside, its center at -x);
+      "openexr" (as "mitsuba", its outermost pixels centered on the poles and on the seam).
     - "angular-map", 1 : 1, Debevec's light probe: the direction at an angle of π·r from forward
       is at radius r, 1 at the circle. "jaxsh": forward, the picture's center, at -x, its right at
       +y, its up at +z. "-z", "+z": y-up axes with forward at -z or +z and +x to the right;
