@@ -223,6 +223,13 @@ def test_what_the_base_color_does_not_hold_is_said():
     attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"]
     attributes["TEXCOORD_0"] = gltf.add(np.float32(2 * UV))
     assert "clamped or mirrored" in said(gltf)
+    gltf = textured(encoded(), normalTexture={"index": 0})
+    (material,) = gltf.json["materials"]
+    material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {"index": 0}
+    material["extensions"] = {"KHR_materials_clearcoat": {"clearcoatTexture": {"index": 0}}}
+    maps = "clearcoatTexture metallicRoughnessTexture normalTexture"
+    assert said(gltf) == f"3 other maps of materials ignored ({maps})"
+    assert "give off light" in said(textured(encoded(), emissiveFactor=[0, 1, 0]))
     gltf = textured(encoded())
     gltf.json["extensions"] = {"KHR_materials_variants": {"variants": [{"name": "a"}] * 3}}
     assert said(gltf) == "3 material variants ignored: the default is read"

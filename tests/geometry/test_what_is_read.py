@@ -272,6 +272,10 @@ TRIED: dict[tuple[str, str], tuple[Any, Any]] = {
         {"a.ply": ply(c="comment TextureFile a.png\n"), "a.png": png()},
         picture,
     ),
+    ("other maps", ".glb"): (
+        gltf(material=lambda one: one.entry("materials", normalTexture={"index": 0})),
+        "1 other maps of materials ignored",
+    ),
     ("other maps", ".obj"): (
         {"a.obj": f"mtllib a.mtl\nusemtl a\n{OBJ_FACE}", "a.mtl": MTL + "map_Bump a.png\n"},
         "map_bump of materials ignored",

@@ -35,14 +35,17 @@ class Materials:
         self._pictures = Pictures(document)
         self._rows: dict[int, int] = {}
         self._surfaces: list[_Surface] = []
+        self._other_maps: list[str] = []
 
     @property
     def table(self) -> tuple[BaseColor, ...]:
         return tuple(surface.color for surface in self._surfaces)
 
     def note_unread(self) -> None:
-        """Note the textures whose pictures could not be read."""
+        """Note the pictures that could not be read, and those that are of no base color."""
         self._pictures.note_unread()
+        names = " ".join(sorted(set(self._other_maps)))
+        self._document.note(f"other maps of materials ignored ({names})", len(self._other_maps))
 
     def row(self, index: int, owner: str) -> int:
         """Give the row in `table` of a material of the file."""
@@ -83,6 +86,9 @@ class Materials:
         r, g, b, a = numbers(base, factor_key, owner, 4, [1.0, 1.0, 1.0, 1.0])
         if (text(fields, "alphaMode", owner) or "OPAQUE") != "OPAQUE":
             self._document.note("materials are cut out or blended by alpha, read as whole surfaces")
+        if any(numbers(fields, "emissiveFactor", owner, 3, [0.0, 0.0, 0.0])):
+            self._document.note("materials that give off light read as if they did not")
+        self._other_maps += _other_maps(fields, owner)
         surface = _Surface(BaseColor(name, (r, g, b, a), None, double_sided))
         if base.get(texture_key) is None:
             return surface
@@ -107,6 +113,21 @@ class Materials:
             wraps = [whole(sampler, key, name, _REPEAT) for key in ("wrapS", "wrapT")]
             repeats = wraps == [_REPEAT, _REPEAT]
         return _Surface(color, True, uv_set, matrix, repeats)
+
+
+def _other_maps(fields: Fields, owner: str) -> list[str]:
+    """Name the textures of a material that are not of its base color."""
+    extensions = inner(fields, "extensions", owner)
+    groups = [fields, inner(fields, "pbrMetallicRoughness", owner)]
+    groups += [inner(extensions, name, owner) for name in extensions]
+    return [
+        key
+        for group in groups
+        for key, value in group.items()
+        if key.endswith("Texture")
+        and key not in ("baseColorTexture", "diffuseTexture")
+        and value is not None
+    ]
 
 
 def _uv_matrix(fields: Fields, owner: str) -> Float[np.ndarray, "2 3"]:
