@@ -278,7 +278,7 @@ TRIED: dict[tuple[str, str], tuple[Any, Any]] = {
     ),
     ("other maps", ".obj"): (
         {"a.obj": f"mtllib a.mtl\nusemtl a\n{OBJ_FACE}", "a.mtl": MTL + "map_Bump a.png\n"},
-        "map_bump of materials ignored",
+        r"of materials ignored \(map_bump",
     ),
     ("several objects", ".glb"): (
         gltf(lambda one: one.entry("nodes", mesh=0, translation=[9, 0, 0])), has_area(2 * SURFACE)
@@ -313,7 +313,7 @@ TRIED: dict[tuple[str, str], tuple[Any, Any]] = {
     ("curves and surfaces", ".obj"): (OBJ_FACE + "curv 0 1 1 2\nend\n", "1 curves ignored"),
     ("smoothing groups", ".obj"): ("s 1\n" + OBJ_FACE + "s 2\nf 3 2 1\n", "2 smoothing groups"),
     ("other columns", ".obj"): (OBJ_FACE.replace("0 1 0", "0 1 0 1 1"), "further values of 1"),
-    ("other columns", ".ply"): (ply(v="property float quality\n", a=" 1"), "properties quality of"),
+    ("other columns", ".ply"): (ply(v="property float quality\n", a=" 1"), r"properties of vertices ignored \(quality"),
     ("other columns", ".off"): (off(more=" 7"), "1 further values of each vertex ignored"),
 }  # fmt: skip
 
