@@ -313,7 +313,9 @@ TRIED: dict[tuple[str, str], tuple[Any, Any]] = {
     ("curves and surfaces", ".obj"): (OBJ_FACE + "curv 0 1 1 2\nend\n", "1 curves ignored"),
     ("smoothing groups", ".obj"): ("s 1\n" + OBJ_FACE + "s 2\nf 3 2 1\n", "2 smoothing groups"),
     ("other columns", ".obj"): (OBJ_FACE.replace("0 1 0", "0 1 0 1 1"), "further values of 1"),
-    ("other columns", ".ply"): (ply(v="property float quality\n", a=" 1"), r"properties of vertices ignored \(quality"),
+    ("other columns", ".ply"): (
+        ply(v="property float quality\n", a=" 1"), r"vertices ignored \(quality"
+    ),
     ("other columns", ".off"): (off(more=" 7"), "1 further values of each vertex ignored"),
 }  # fmt: skip
 
