@@ -17,7 +17,7 @@ from jaxsh import geometry, harmonics, transfer
 from ..runner import Context
 from .reference import VARIANTS, Estimate, Receivers, direct, turned
 
-OFFSET = 1e-4  # of rays, in half-extents: the bake's default
+OFFSET = 1e-4  # of rays, in half-extents
 
 
 class Subject(NamedTuple):
