@@ -80,7 +80,7 @@ def test_each_coding_is_read_exactly(tmp_path, rng, coding):
     np.testing.assert_array_equal(read_environment(path), values(pixels))
 
 
-@pytest.mark.parametrize("width", [1, 2, 7, 8, 300, 32767, 70000])
+@pytest.mark.parametrize("width", [1, 2, 7, 8, 300, 514, 32767, 70000])
 @pytest.mark.parametrize("coding", CODINGS)
 def test_rows_of_any_width(rng, width, coding):
     """Runs of more than 256 pixels have two digits or more, and marks end at 32767."""
