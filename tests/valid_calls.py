@@ -7,7 +7,18 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsh import adaptive, geometry, harmonics, inverse, midrange, plot, sky, sphere, transfer
+from jaxsh import (
+    adaptive,
+    geometry,
+    harmonics,
+    imaging,
+    inverse,
+    midrange,
+    plot,
+    sky,
+    sphere,
+    transfer,
+)
 
 RNG = np.random.default_rng(14)
 V, K = 6, 9
@@ -471,6 +482,260 @@ def of_plot():
     }
 
 
+def of_geometry():
+    g = geometry
+    mesh, file = knot(), {"path": "no such file.ply", "up": "z"}
+    rays = {
+        "origins": floats(4, 3).astype(np.float32),
+        "directions": floats(4, 3).astype(np.float32),
+    }
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    scene = g.JaxRayScene(mesh)
+    made = {"normals": "smooth", "origin": (0.0, 0.0, 0.0), "two_sided": True}
+    return {
+        "EmbreeRayScene": of(g.EmbreeRayScene, meshes=[mesh], slow=True),
+        "JaxRayScene": of(g.JaxRayScene, meshes=[mesh], slow=True),
+        "JaxRayScene.closest_hit": of(scene.closest_hit, **rays, slow=True),
+        "JaxRayScene.occluded": of(scene.occluded, **rays, max_distance=3.0, slow=True),
+        "Mesh": of(
+            g.Mesh,
+            vertices=floats(4, 3),
+            faces=np.zeros((2, 3), np.int32),
+            normals=floats(4, 3),
+            uv=floats(4, 2),
+            colors=floats(4, 4),
+            face_material=np.zeros(2, np.int32),
+            materials=(g.BaseColor(),),
+            origin=(0.0, 0.0, 0.0),
+        ),
+        "knot": of(g.knot, vertices=300, slow=True),
+        "make_mesh": of(
+            g.make_mesh, vertices=corners, faces=np.array([[0, 1, 2], [0, 2, 3]]), **made, host=True
+        ),
+        "neighbors": of(g.neighbors, mesh=mesh, host=True),
+        "ray_scene": of(g.ray_scene, meshes=[mesh], slow=True),
+        "read_mesh": of(g.read_mesh, **file, colors="srgb", **made, slow=True),
+        "topology": of(g.topology, mesh=mesh, host=True),
+        "trace": of(
+            g.trace, tree=scene.tree, **rays, max_distance=3.0, first=True, count=None, lanes=8
+        ),
+        "vertex_normals": of(g.vertex_normals, vertices=mesh.vertices, faces=mesh.faces),
+        "write_mesh": of(g.write_mesh, path="/dev/null/no/knot.ply", mesh=mesh, up="z", slow=True),
+    }
+
+
+def of_imaging():
+    i = imaging
+    image, mesh = floats(6, 12, 3), knot()
+    camera = i.Camera((0.3, -4.0, 0.2), (0.0, 0.0, 0.0), width=6, height=8)
+    raster = i.rasterize(mesh, camera)
+    return {
+        "Camera": of(
+            i.Camera,
+            position=eye(),
+            target=np.zeros(3),
+            up=np.array([0.0, 0.0, 1.0]),
+            fov_y=40.0,
+            width=6,
+            height=8,
+            finite="position target up fov_y",
+        ),
+        "Camera.facing": of(
+            i.Camera.facing,
+            mesh=mesh,
+            toward=(0.0, -1.0, 0.2),
+            fov_y=30.0,
+            width=6,
+            height=8,
+            margin=0.05,
+            host=True,
+            finite="fov_y margin",
+        ),
+        "Raster": of(
+            i.Raster,
+            face=np.zeros((8, 6), np.int32),
+            barycentric=floats(8, 6, 3),
+            faces=np.zeros((2, 3), np.int32),
+            samples=1,
+        ),
+        "auto_exposure": of(
+            i.auto_exposure, image=image, mask=image[..., 0] > 0.5, percentile=90.0
+        ),
+        "backdrop": of(i.backdrop, environment=image, camera=camera),
+        "interpolate": of(
+            i.interpolate, raster=raster, values=floats(300, 3), background=floats(3)
+        ),
+        "look_up": of(i.look_up, environment=image, directions=floats(4, 3)),
+        "psnr": of(i.psnr, image=image, reference=image, mask=image[..., 0] > 0.5, peak=1.0),
+        "rasterize": of(
+            i.rasterize,
+            mesh=mesh,
+            camera=camera,
+            samples=1,
+            scene=geometry.ray_scene(mesh),
+            slow=True,
+        ),
+        "read_environment": of(
+            i.read_environment,
+            path="no such file.exr",
+            layout="lat-long",
+            orientation="jaxsh",
+            encoding="srgb",
+            layer="beauty",
+            height=8,
+            repair=True,
+            slow=True,
+        ),
+        "srgb_decode": of(i.srgb_decode, signal=image),
+        "srgb_encode": of(i.srgb_encode, linear=image),
+        "studio": of(i.studio, height=8, width=16),
+        "tone_map": of(i.tone_map, image=image, exposure=1.0, curve="reinhard", white=2.0),
+        "write_image": of(
+            i.write_image, path="/dev/null/no/a.exr", image=image, encoding=None, slow=True
+        ),
+    }
+
+
+def of_midrange():
+    m, light = midrange, lamp()
+    points, positions = floats(4, 3), floats(V, 3)
+    ball = m.Sphere(np.array([0.0, 0.0, 3.0]), 0.5, np.ones(3))
+    scene, cube = m.Scene([light], [ball]), m.capture(m.Scene([light]), points[0], 2)
+    samples = m.surface_samples([light], 4)
+    expansions = m.Expansion(floats(5, 3), floats(5, 3, 4, 4))
+    one = m.Expansion(floats(3), floats(3, 4, 4))
+    baked = transfer.unshadowed(positions, floats(V, 3), 1)
+    weights = m.inverse_distance_weights(positions, expansions.point)
+    polygon = {"polygon": light, "point": points, "degree": 1}
+    behind = {"horizon": np.array([0.0, 0.0, 1.0]), "blockers": [light]}
+    grid = m.Grid(np.zeros(3), np.ones(3), (2, 2, 3))
+    search = {"exponent": 6.0, "checks": 8, "seed": 0}
+
+    def evaluate(points):
+        return m.Expansion(points, np.ones((len(points), 3, 4, 4)))
+
+    return {
+        "EmissiveMesh": of(
+            m.EmissiveMesh, mesh=knot(), radiance=np.ones(3), two_sided=False, finite="radiance"
+        ),
+        "Expansion": of(m.Expansion, point=floats(5, 3), terms=floats(5, 3, 9, 4)),
+        "Expansion.truncated": of(one.truncated, order=1),
+        "Grid": of(
+            m.Grid, lower=np.zeros(3), upper=np.ones(3), shape=(2, 2, 3), finite="lower upper"
+        ),
+        "Grid.weights": of(grid.weights, positions=positions),
+        "Polygon": of(
+            m.Polygon,
+            vertices=np.asarray(light.vertices),
+            radiance=np.ones(3),
+            two_sided=False,
+            finite="vertices radiance",
+        ),
+        "RadianceCube": of(
+            m.RadianceCube,
+            radiance=floats(24, 3),
+            distance=floats(24),
+            plane_distance=floats(24),
+            normal=floats(24, 3),
+            point=floats(3),
+        ),
+        "Scene": of(
+            m.Scene, emitters=[light], blockers=[ball], environment=floats(4, 8, 3), host=True
+        ),
+        "Sphere": of(
+            m.Sphere,
+            center=np.zeros(3),
+            radius=0.5,
+            radiance=np.ones(3),
+            finite="center radius radiance",
+        ),
+        "SurfaceSamples": of(
+            m.SurfaceSamples,
+            points=floats(7, 3),
+            normals=floats(7, 3),
+            areas=floats(7),
+            radiance=floats(7, 3),
+        ),
+        "capture": of(
+            m.capture,
+            scene=scene,
+            point=points,
+            resolution=2,
+            rays="analytic",
+            finite="point",
+            slow=True,
+        ),
+        "extrapolate": of(m.extrapolate, expansion=one, positions=positions),
+        "grid_around": of(m.grid_around, positions=positions, shape=(2, 2, 3), host=True),
+        "interpolate": of(
+            m.interpolate, expansions=expansions, weights=weights, positions=positions, rule="full"
+        ),
+        "inverse_distance_weights": of(
+            m.inverse_distance_weights, positions=positions, points=points, exponent=4.0
+        ),
+        "make_expansion": of(
+            m.make_expansion,
+            point=points,
+            coefficients=floats(4, 3, 9),
+            gradient=floats(4, 3, 9, 3),
+        ),
+        "monomials": of(m.monomials, offsets=points, order=2),
+        "moving_least_squares_weights": of(
+            m.moving_least_squares_weights, positions=positions, points=floats(5, 3), exponent=2.0
+        ),
+        "place_samples": of(
+            m.place_samples,
+            positions=positions,
+            count=2,
+            method="kmeans",
+            evaluate=evaluate,
+            target=0.1,
+            candidates=4,
+            **search,
+            slow=True,
+        ),
+        "polygon_harmonics": of(m.polygon_harmonics, **polygon, **behind, slow=True),
+        "polygon_harmonics_with_gradient": of(
+            m.polygon_harmonics_with_gradient, **polygon, **behind, slow=True
+        ),
+        "project_cube": of(m.project_cube, cube=cube, degree=1),
+        "project_cube_with_gradient": of(
+            m.project_cube_with_gradient, cube=cube, degree=1, gradient="edges"
+        ),
+        "project_surface": of(m.project_surface, samples=samples, point=points, degree=1),
+        "project_surface_with_gradient": of(
+            m.project_surface_with_gradient, samples=samples, point=points, degree=1
+        ),
+        "shade": of(
+            m.shade,
+            expansions=expansions,
+            transfer=baked,
+            albedo=floats(V, 3),
+            weights=weights,
+            rule="full",
+            finite="albedo",
+        ),
+        "sphere_harmonics": of(m.sphere_harmonics, sphere=ball, point=points, degree=1),
+        "sphere_harmonics_with_gradient": of(
+            m.sphere_harmonics_with_gradient, sphere=ball, point=points, degree=1
+        ),
+        "surface_samples": of(m.surface_samples, emitters=[light], count=4, host=True),
+        "taylor": of(m.taylor, cube=cube, degree=1, order=1),
+        "update_samples": of(
+            m.update_samples,
+            points=points,
+            candidates=floats(4, 3),
+            positions=positions,
+            evaluate=evaluate,
+            target=0.1,
+            release=0.05,
+            limit=5,
+            **search,
+            slow=True,
+        ),
+    }
+
+
 TABLES = {
     "harmonics": of_harmonics,
     "sphere": of_sphere,
@@ -479,6 +744,9 @@ TABLES = {
     "adaptive": of_adaptive,
     "inverse": of_inverse,
     "plot": of_plot,
+    "geometry": of_geometry,
+    "imaging": of_imaging,
+    "midrange": of_midrange,
 }
 # Classes that functions make: not for a user to make by hand.
 MADE = {
@@ -487,6 +755,9 @@ MADE = {
     "adaptive": {"AbstractMethod", "AdaptiveResult", "StagedTransfer", "Tiling"},
     "inverse": {"Confidence", "Recovered", "Rectangle", "SkyLight", "Statistics"},
     "plot": set(),
+    "geometry": {"BaseColor", "Hit", "RayScene", "RayTree", "Topology", "Trace"},
+    "imaging": set(),
+    "midrange": {"Update", "Weights"},
     "sky": {"Axis", "FitError", "PreethamConstants", "SkyFit", "SkyWarning", "Solution"},
     "transfer": {
         "AbstractTransfer",
