@@ -33,6 +33,8 @@ class Call(NamedTuple):
     finite: frozenset[str] = frozenset()
     # Runs in NumPy, reads files, or looks at values: cannot be traced.
     host: bool = False
+    # Arguments that take much: a path, a name, a string or a number.
+    free: frozenset[str] = frozenset()
     # Only what is refused at once is tried.
     slow: bool = False
 
@@ -41,8 +43,10 @@ def floats(*shape: int):
     return RNG.uniform(0.2, 1.0, size=shape)
 
 
-def of(function, *, finite: str = "", host: bool = False, slow: bool = False, **arguments):
-    return Call(function, arguments, frozenset(finite.split()), host or slow, slow)
+def of(function, *, finite: str = "", free: str = "path", host=False, slow=False, **arguments):
+    """A `Call`; names are in one string, separated by spaces."""
+    names = frozenset(finite.split()), frozenset(free.split())
+    return Call(function, arguments, names[0], host or slow, names[1], slow)
 
 
 @functools.cache
@@ -224,7 +228,7 @@ def of_sky():
             lambda sun, turbidity: fit(sun, turbidity), **both, finite="sun turbidity"
         ),
         "SkyFit.truncated": of(fit.truncated, degree=1),
-        "c_header": of(k.c_header, fit=plain_fit(), prefix="my_sky", host=True),
+        "c_header": of(k.c_header, fit=plain_fit(), prefix="my_sky", free="prefix", host=True),
         "cie_radiance": of(
             k.cie_radiance,
             view=view,
@@ -497,24 +501,20 @@ def of_geometry():
         "JaxRayScene": of(g.JaxRayScene, meshes=[mesh], slow=True),
         "JaxRayScene.closest_hit": of(scene.closest_hit, **rays, slow=True),
         "JaxRayScene.occluded": of(scene.occluded, **rays, max_distance=3.0, slow=True),
-        "Mesh": of(
-            g.Mesh,
-            vertices=floats(4, 3),
-            faces=np.zeros((2, 3), np.int32),
-            normals=floats(4, 3),
-            uv=floats(4, 2),
-            colors=floats(4, 4),
-            face_material=np.zeros(2, np.int32),
-            materials=(g.BaseColor(),),
-            origin=(0.0, 0.0, 0.0),
-        ),
         "knot": of(g.knot, vertices=300, slow=True),
         "make_mesh": of(
-            g.make_mesh, vertices=corners, faces=np.array([[0, 1, 2], [0, 2, 3]]), **made, host=True
+            g.make_mesh,
+            vertices=corners,
+            faces=np.array([[0, 1, 2], [0, 2, 3]]),
+            **made,
+            free="normals origin",
+            slow=True,
         ),
         "neighbors": of(g.neighbors, mesh=mesh, host=True),
         "ray_scene": of(g.ray_scene, meshes=[mesh], slow=True),
-        "read_mesh": of(g.read_mesh, **file, colors="srgb", **made, slow=True),
+        "read_mesh": of(
+            g.read_mesh, **file, colors="srgb", **made, free="path normals origin", slow=True
+        ),
         "topology": of(g.topology, mesh=mesh, host=True),
         "trace": of(
             g.trace, tree=scene.tree, **rays, max_distance=3.0, first=True, count=None, lanes=8
@@ -548,15 +548,9 @@ def of_imaging():
             width=6,
             height=8,
             margin=0.05,
+            free="toward",
             host=True,
             finite="fov_y margin",
-        ),
-        "Raster": of(
-            i.Raster,
-            face=np.zeros((8, 6), np.int32),
-            barycentric=floats(8, 6, 3),
-            faces=np.zeros((2, 3), np.int32),
-            samples=1,
         ),
         "auto_exposure": of(
             i.auto_exposure, image=image, mask=image[..., 0] > 0.5, percentile=90.0
@@ -584,6 +578,7 @@ def of_imaging():
             layer="beauty",
             height=8,
             repair=True,
+            free="path layer",
             slow=True,
         ),
         "srgb_decode": of(i.srgb_decode, signal=image),
@@ -748,6 +743,14 @@ TABLES = {
     "imaging": of_imaging,
     "midrange": of_midrange,
 }
+
+
+@functools.cache
+def table(module: str) -> dict[str, Call]:
+    """The calls of a module's functions and constructors by name, methods as `Class.method`."""
+    return TABLES[module]()
+
+
 # Classes that functions make: not for a user to make by hand.
 MADE = {
     "harmonics": set(),
@@ -755,8 +758,8 @@ MADE = {
     "adaptive": {"AbstractMethod", "AdaptiveResult", "StagedTransfer", "Tiling"},
     "inverse": {"Confidence", "Recovered", "Rectangle", "SkyLight", "Statistics"},
     "plot": set(),
-    "geometry": {"BaseColor", "Hit", "RayScene", "RayTree", "Topology", "Trace"},
-    "imaging": set(),
+    "geometry": {"BaseColor", "Hit", "Mesh", "RayScene", "RayTree", "Topology", "Trace"},
+    "imaging": {"Raster"},
     "midrange": {"Update", "Weights"},
     "sky": {"Axis", "FitError", "PreethamConstants", "SkyFit", "SkyWarning", "Solution"},
     "transfer": {

@@ -13,16 +13,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, ArrayLike, Float, Int
+from jaxtyping import Array, Float, Int
 
 # A light, an eye, a few thousand albedos: looking at more would take time of every call.
 _FEW = 2**16
+_ON_HOST = "this runs on the host, before jit, vmap and grad"
 # JAX arrays that were looked at and are right, by the bound and by their ids, for as long as they
 # live: they do not change.
 _right: dict[float | None, weakref.WeakValueDictionary[int, Any]] = {}
 
 
-def as_float(value: ArrayLike, name: str = "") -> Float[Array, "..."]:
+def as_float(value: Any, name: str = "") -> Float[Array, "..."]:
     """Convert to a floating-point JAX array; integers become JAX's default float.
 
     Raises `ValueError` for what is no array of real numbers, and for integers of 8 and 16 bits:
@@ -39,7 +40,7 @@ def as_float(value: ArrayLike, name: str = "") -> Float[Array, "..."]:
     return array.astype(jnp.result_type(float))
 
 
-def as_integer(value: ArrayLike, name: str) -> Int[Array, "..."]:
+def as_integer(value: Any, name: str) -> Int[Array, "..."]:
     """Convert to an array of integers; raises `ValueError` for anything else."""
     array = value if isinstance(value, Array) else _as_array(value, name)
     if jnp.issubdtype(array.dtype, jnp.integer):
@@ -54,16 +55,13 @@ def as_path(value: Any, name: str = "path") -> Path:
     raise TypeError(f"expected {name} as a string or a path, got {described(value)}")
 
 
-def as_host_float(value: ArrayLike, name: str) -> Float[np.ndarray, "..."]:
+def as_host_float(value: Any, name: str) -> Float[np.ndarray, "..."]:
     """Convert to floating point on the host, integers to float64.
 
     Raises `ValueError` for what is traced or no real numbers.
     """
     if isinstance(value, Tracer):
-        raise ValueError(
-            f"expected known values for {name}, got traced ones: this runs on the host, before "
-            "jit, vmap and grad"
-        )
+        raise ValueError(f"expected known values for {name}, got traced ones: {_ON_HOST}")
     try:
         array = np.asarray(value)
     except (TypeError, ValueError):  # lists of several lengths
@@ -77,8 +75,21 @@ def as_host_float(value: ArrayLike, name: str) -> Float[np.ndarray, "..."]:
     raise ValueError(f"expected real numbers for {name}, got {described(value)}")
 
 
+def as_host_integer(value: Any, name: str) -> Int[np.ndarray, "..."]:
+    """Convert to integers on the host; raises `ValueError` for what is traced or none."""
+    if isinstance(value, Tracer):
+        raise ValueError(f"expected known values for {name}, got traced ones: {_ON_HOST}")
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):  # lists of several lengths
+        raise ValueError(f"expected integers for {name}, got {described(value)}") from None
+    if array.dtype.kind not in "iu":
+        raise ValueError(f"expected integers for {name}, got {described(value)}")
+    return array
+
+
 def as_finite(
-    value: ArrayLike, name: str, *, least: float | None = None, wait: bool = False
+    value: Any, name: str, *, least: float | None = None, wait: bool = False
 ) -> Float[Array, "..."]:
     """Convert as `as_float` does, and check as `check_finite` does."""
     array = as_float(value, name)

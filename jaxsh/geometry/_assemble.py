@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from .._core.checks import described
 from .._core.words import reason
 from ._clean import Clean, clean
 from ._files._polygons import Polygons
@@ -31,10 +32,12 @@ def check_options(normals: Normals, origin: object) -> None:
     if isinstance(normals, str):
         known = normals in ("file", "smooth")
     else:
-        known = not isinstance(normals, bool) and 0 <= normals <= 180
+        number = isinstance(normals, int | float | np.number) and not isinstance(normals, bool)
+        known = number and 0 <= normals <= 180
     if not known:
         raise ValueError(
-            f'normals must be "file", "smooth" or an angle from 0 to 180 degrees, got {normals!r}'
+            f'normals must be "file", "smooth" or an angle from 0 to 180 degrees, got '
+            f"{described(normals)}"
         )
     if origin is not None:
         try:
@@ -42,7 +45,7 @@ def check_options(normals: Normals, origin: object) -> None:
         except (TypeError, ValueError):
             point = np.zeros(0)
         if point.shape != (3,) or not np.isfinite(point).all():
-            raise ValueError(f"origin must be three finite numbers, got {origin!r}")
+            raise ValueError(f"origin must be three finite numbers, got {described(origin)}")
 
 
 def assemble(

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from .._core.checks import check_all
 from ._frame import Frame, framed
 from ._mesh import Mesh
 from ._rays import Hit, Vectors, limits_of, paired, prepared
@@ -52,7 +53,8 @@ class JaxRayScene:
     frame: Frame
 
     def __init__(self, meshes: Mesh | Sequence[Mesh]):
-        meshes = [meshes] if isinstance(meshes, Mesh) else list(meshes)
+        meshes = [meshes] if isinstance(meshes, Mesh) else meshes
+        check_all("meshes", meshes, Mesh, least=0)
         if not meshes:
             raise ValueError("JaxRayScene needs at least one mesh, got an empty sequence")
         points, faces, self.frame = framed(meshes)

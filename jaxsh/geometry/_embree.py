@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from .._core.checks import check_all
 from .._core.host import cores
 from ._cast import JaxRayScene
 from ._frame import Frame, framed
@@ -101,7 +102,8 @@ class EmbreeRayScene:
                 "JaxRayScene then, which answers the same questions"
             )
         build_mesh, build_scene = classes
-        meshes = [meshes] if isinstance(meshes, Mesh) else list(meshes)
+        meshes = [meshes] if isinstance(meshes, Mesh) else meshes
+        check_all("meshes", meshes, Mesh, least=0)
         if not meshes:
             raise ValueError("EmbreeRayScene needs at least one mesh, got an empty sequence")
         points, faces, self.frame = framed(meshes)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from .._core.checks import check_size
 from ._make import make_mesh
 from ._mesh import Mesh
 
@@ -26,7 +27,7 @@ def knot(vertices: int = 20_000) -> Mesh:
     >>> print(geometry.topology(geometry.knot(300)))
     300 vertices and 600 faces in 1 piece, closed, genus 1
     """
-    if vertices < 300:
+    if check_size("vertices", vertices) < 300:
         raise ValueError(f"a knot needs at least 300 vertices to be one, got {vertices}")
     # Sample the curve finely, then place rings at equal arc length.
     fine = np.linspace(0, 2 * math.pi, 20_001)

@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from .._core.checks import as_host_float, as_host_integer, check_flag
 from ._assemble import Normals, Origin, assemble, check_options
 from ._clean import check_arrays
 from ._files._polygons import Polygons
@@ -43,9 +44,10 @@ def make_mesh(
     [0.0, 0.0, 1.0]
     """
     check_options(normals, origin)
+    two_sided = check_flag("two_sided", two_sided)
     if normals == "file":
         raise ValueError('normals of arrays are "smooth" or an angle in degrees, got "file"')
-    vertices, faces = np.asarray(vertices), np.asarray(faces)
+    vertices, faces = as_host_float(vertices, "vertices"), as_host_integer(faces, "faces")
     try:
         check_arrays(vertices, faces)
     except ValueError as error:

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float, Int
 
+from .._core.checks import as_float, as_integer
 from .._core.xla import keep_rows, rows_are_split
 from ._base_color import BaseColor
 
@@ -59,6 +60,10 @@ def vertex_normals(vertices: Float[Array, "v 3"], faces: Int[Array, "f 3"]) -> F
     >>> geometry.vertex_normals(2 * mesh.vertices, mesh.faces).shape
     (300, 3)
     """
+    vertices, faces = as_float(vertices, "vertices"), as_integer(faces, "faces")
+    for name, array in (("vertices", vertices), ("faces", faces)):
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise ValueError(f"expected {name} (n, 3), got shape {array.shape}")
     if rows_are_split(vertices):
         raise ValueError(
             "vertex normals need all vertices on each device, since faces name any of them: share "

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from .._core.checks import as_host_float
 from ._frame import Frame
 
 # One vector for each ray, or one for all of them.
@@ -82,7 +83,10 @@ class RayScene(Protocol):
 
 def paired(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:
     """Give both as (n, 3) NumPy arrays; one that all rays share is repeated without a copy."""
-    arrays = {"origins": np.asarray(origins), "directions": np.asarray(directions)}
+    arrays = {
+        "origins": as_host_float(origins, "origins"),
+        "directions": as_host_float(directions, "directions"),
+    }
     for name, array in arrays.items():
         if array.ndim not in (1, 2) or array.shape[-1] != 3:
             raise ValueError(f"{name} must have shape (n, 3) or (3,), got {array.shape}")
@@ -97,6 +101,7 @@ def paired(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def limits_of(max_distance: Any, count: int) -> np.ndarray:
     """Give one float32 limit for each ray; one that all share is repeated without a copy."""
+    max_distance = as_host_float(max_distance, "max_distance")
     if np.ndim(max_distance) not in (0, 1) or np.size(max_distance) not in (1, count):
         raise ValueError(
             f"max_distance must be a number or have shape ({count},), one for each ray, "

@@ -1,11 +1,11 @@
 """Mesh files, each format by its parser, as one `Mesh`."""
 
 import os
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from .._core.checks import as_path, check_choice, check_flag
 from .._core.words import reason
 from ._assemble import Normals, Origin, assemble, check_options
 from ._files._gltf import read_gltf
@@ -72,16 +72,16 @@ def read_mesh(
     ...     geometry.read_mesh(path).vertices.shape
     (3, 3)
     """
-    path = Path(path)
+    path = as_path(path)
+    for name, value, options in (("up", up, ("z", "y")), ("colors", colors, ("srgb", "linear"))):
+        if value is not None:
+            check_choice(name, value, options)
+    two_sided = check_flag("two_sided", two_sided)
     suffix = path.suffix.lower()
     if suffix not in _PARSERS:
         raise ValueError(f"{path}: cannot read {suffix or 'no extension'}, only {tuple(_PARSERS)}")
     gltf = suffix in (".glb", ".gltf")
     up = up or ("y" if gltf else "z")
-    if up not in ("z", "y"):
-        raise ValueError(f'up must be "z" or "y", got {up!r}')
-    if colors not in (None, "srgb", "linear"):
-        raise ValueError(f'colors must be "srgb" or "linear", got {colors!r}')
     check_options(normals, origin)
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such mesh file")

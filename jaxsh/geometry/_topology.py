@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int
 
+from .._core.checks import check_type
 from ._clean import first_of_equals
 from ._files._text import ranges
 from ._mesh import Mesh
@@ -93,6 +94,7 @@ def topology(mesh: Mesh) -> Topology:
     >>> found.closed, found.boundary_edges, found.euler
     (False, 3, 1)
     """
+    check_type("mesh", mesh, Mesh)
     faces = np.asarray(mesh.faces, np.int64)
     faces = _joined(mesh, faces)[faces]
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
@@ -154,6 +156,7 @@ def neighbors(mesh: Mesh) -> Int[Array, "v n"]:
     >>> geometry.neighbors(geometry.knot(300)).shape
     (300, 6)
     """
+    check_type("mesh", mesh, Mesh)
     faces, count = np.asarray(mesh.faces, np.int64), len(mesh.vertices)
     joined = _joined(mesh, faces)
     faces = joined[faces]

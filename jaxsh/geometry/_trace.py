@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
+from .._core.checks import as_float, as_integer, check_size, check_type, described
 from .._core.xla import keep_rows, on_mesh, rows_are_split
 from ._tree import RayTree
 from ._triangle import meet
@@ -63,10 +64,10 @@ def trace(
 ) -> Trace:
     """Find the first triangle that each ray meets, or with `first=False` any one (for shadows).
 
-    The pure core of `JaxRayScene`, for use inside `jit` and `vmap`: nothing is checked, distances
-    are in lengths of the direction, and all is float32. `origins` and `directions` are (n, 3),
-    directions of any length, origins in the coordinates of the meshes, wherever these lie and
-    however large they are; only origins of many thousand times their size lose digits.
+    The pure core of `JaxRayScene`, for use inside `jit` and `vmap`: values are not looked at,
+    distances are in lengths of the direction, and all is float32. `origins` and `directions` are
+    (n, 3), directions of any length, origins in the coordinates of the meshes, wherever these lie
+    and however large they are; only origins of many thousand times their size lose digits.
     `count` rays are cast (default: all), the rest miss; it may be traced, so that one compiled
     program serves any number of rays. A ray with a zero or NaN direction misses.
 
@@ -89,6 +90,22 @@ def trace(
     >>> found.triangle.shape, found.barycentric.shape
     ((2,), (2, 3))
     """
+    check_type("tree", tree, RayTree)
+    origins, directions = as_float(origins, "origins"), as_float(directions, "directions")
+    max_distance = as_float(max_distance, "max_distance")
+    for name, rays in (("origins", origins), ("directions", directions)):
+        if rays.ndim != 2 or rays.shape != (len(origins), 3):
+            raise ValueError(f"expected {name} (n, 3), got shape {rays.shape}")
+    if max_distance.shape not in ((), (len(origins),)):
+        raise ValueError(
+            f"expected max_distance as a number or ({len(origins)},), got shape "
+            f"{max_distance.shape}"
+        )
+    lanes = check_size("lanes", lanes)
+    if not isinstance(first, bool) and not (isinstance(first, Array) and first.shape == ()):
+        raise ValueError(f"first must be True or False, got {described(first)}")
+    if count is not None and as_integer(count, "count").ndim:
+        raise ValueError(f"expected count as a number, got {described(count)}")
     tree, origins, directions, max_distance = lax.stop_gradient(
         (tree, origins, directions, max_distance)
     )

@@ -9,12 +9,19 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from .._core.checks import as_finite, as_float, check_number, check_size, check_type, described
 from ..geometry import Mesh
 
 
-def _point(x: Any) -> Array:
-    x = jnp.asarray(x)
-    return x if jnp.issubdtype(x.dtype, jnp.floating) else x.astype(jnp.float32)
+def _point(name: str):
+    """Converts a vector; integers become float32."""
+
+    def convert(value: Any) -> Array:
+        vector = as_finite(value, name, wait=True)
+        whole = not isinstance(value, Array) and np.asarray(value).dtype.kind in "iu"
+        return vector.astype(jnp.float32) if whole else vector
+
+    return convert
 
 
 class Camera(eqx.Module):
@@ -33,21 +40,26 @@ class Camera(eqx.Module):
     ((8, 3), (8, 3))
     """
 
-    position: Float[Array, " 3"] = eqx.field(converter=_point)
-    target: Float[Array, " 3"] = eqx.field(converter=_point)
-    up: Float[Array, " 3"] = eqx.field(converter=_point, default=(0.0, 0.0, 1.0))
+    position: Float[Array, " 3"] = eqx.field(converter=_point("position"))
+    target: Float[Array, " 3"] = eqx.field(converter=_point("target"))
+    up: Float[Array, " 3"] = eqx.field(converter=_point("up"), default=(0.0, 0.0, 1.0))
     fov_y: float | Float[Array, ""] = 40.0
     width: int = eqx.field(static=True, default=512)
     height: int = eqx.field(static=True, default=512)
 
     def __check_init__(self):
-        if self.width < 1 or self.height < 1:
+        for name in ("position", "target", "up"):
+            if getattr(self, name).shape != (3,):
+                raise ValueError(f"expected {name} (3,), got shape {getattr(self, name).shape}")
+        if as_float(self.fov_y, "fov_y").ndim:
+            raise ValueError(f"expected fov_y as a number, got {described(self.fov_y)}")
+        if check_size("width", self.width, 0) < 1 or check_size("height", self.height, 0) < 1:
             raise ValueError(f"a picture needs pixels, got {self.width} × {self.height}")
         values = (self.position, self.target, self.up, self.fov_y)
         if any(isinstance(value, Tracer) for value in values):
             return
-        if not 0 < self.fov_y < 180:
-            raise ValueError(f"fov_y must be between 0 and 180 degrees, got {self.fov_y}")
+        if not 0 < float(self.fov_y) < 180:
+            raise ValueError(f"fov_y must be between 0 and 180 degrees, got {float(self.fov_y):g}")
         forward = np.subtract(self.target, self.position, dtype=np.float64)
         up = np.asarray(self.up, np.float64)
         # Written so that NaN is refused too.
@@ -57,7 +69,10 @@ class Camera(eqx.Module):
         ):
             raise ValueError(
                 "target must differ from position, and up must not be along the view: "
-                f"position {self.position}, target {self.target}, up {self.up}"
+                + ", ".join(
+                    f"{name} {np.asarray(getattr(self, name)).tolist()}"
+                    for name in ("position", "target", "up")
+                )
             )
 
     @classmethod
@@ -84,7 +99,17 @@ class Camera(eqx.Module):
         >>> bool(imaging.rasterize(geometry.knot(300), camera).mask.any())
         True
         """
-        aim = cls(position=toward, target=(0, 0, 0), fov_y=fov_y, width=width, height=height)
+        check_type("mesh", mesh, Mesh)
+        fov_y, margin = check_number("fov_y", fov_y), check_number("margin", margin, least=0.0)
+        if margin >= 1:
+            raise ValueError(f"margin must be below 1, got {margin:g}")
+        aim = cls(
+            position=_point("toward")(toward),
+            target=(0, 0, 0),
+            fov_y=fov_y,
+            width=width,
+            height=height,
+        )
         right, upward, forward = np.asarray(aim._axes(), np.float64)
         x, y, z = (
             np.asarray(mesh.vertices, np.float64) @ axis for axis in (right, upward, forward)

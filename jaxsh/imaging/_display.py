@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
+from .._core.checks import as_float, check_choice, check_number, described, is_concrete
 from .._core.linalg import einsum
 from .._core.pictures import as_picture, as_radiance
 from .._core.xla import keep_rows
@@ -91,13 +92,15 @@ def tone_map(
     >>> shown.shape, bool((shown <= 1).all())
     ((8, 16, 3), True)
     """
-    if curve not in ("clip", "reinhard"):
-        raise ValueError(f'curve must be "clip" or "reinhard", got {curve!r}')
+    check_choice("curve", curve, ("clip", "reinhard"))
+    for name, number in (("exposure", exposure), ("white", white)):
+        if as_float(number, name).ndim:
+            raise ValueError(f"expected {name} as a number, got {described(number)}")
     image = as_radiance("image", image)
     if curve == "reinhard" and image.shape[-1:] != (3,):
-        raise ValueError(f"a luminance needs R, G, B in the last axis, got shape {image.shape}")
-    if curve == "reinhard" and not isinstance(white, Tracer) and not white > 0:
-        raise ValueError(f"white must be above 0, got {white}")
+        raise ValueError(f"expected image with R, G, B in the last axis, got shape {image.shape}")
+    if curve == "reinhard" and is_concrete(white) and not float(white) > 0:
+        raise ValueError(f"white must be above 0, got {float(white):g}")
     return _tone_map(image, exposure, white, curve)
 
 
@@ -139,8 +142,7 @@ def auto_exposure(
     >>> imaging.auto_exposure(imaging.studio(8, 16), percentile=90.0).shape
     ()
     """
-    if not 0 <= percentile <= 100:
-        raise ValueError(f"percentile must be between 0 and 100, got {percentile}")
+    percentile = check_number("percentile", percentile, least=0.0, most=100.0)
     image = as_picture("image", image)
     _check_mask(mask, image)
     exposure = functools.partial(_auto_exposure, percentile=percentile)
@@ -184,12 +186,18 @@ def psnr(
             f"expected image and reference of one shape, got {image.shape} and {reference.shape}"
         )
     _check_mask(mask, image)
-    if not isinstance(peak, Tracer) and not peak > 0:
-        raise ValueError(f"peak must be above 0, got {peak}")
+    if as_float(peak, "peak").ndim:
+        raise ValueError(f"expected peak as a number, got {described(peak)}")
+    if not isinstance(peak, Tracer):
+        check_number("peak", peak, above=0.0)
     return _psnr(image, reference, mask, peak)
 
 
 def _check_mask(mask: Bool[Array, "h w"] | None, image: Float[Array, "h w c"]) -> None:
+    if mask is not None and not hasattr(mask, "dtype"):
+        raise ValueError(
+            f"expected mask as booleans of shape {image.shape[:2]}, got {described(mask)}"
+        )
     if mask is not None and (mask.shape != image.shape[:2] or mask.dtype != bool):
         raise ValueError(
             f"expected mask as booleans of shape {image.shape[:2]}, got {mask.dtype} of shape "

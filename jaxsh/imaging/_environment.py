@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._core.checks import as_path, check_flag, check_size, check_type
 from .._core.words import reason
 from ._files import FORMATS, Picture, check_encoding, read_picture
 from ._layouts import check_shape, used_pixels
@@ -100,11 +101,15 @@ def read_environment(
     ...     imaging.read_environment(path).shape
     (8, 16, 3)
     """
+    for name, word in (("layout", layout), ("orientation", orientation), ("layer", layer)):
+        if word is not None:
+            check_type(name, word, str)
+    repair = check_flag("repair", repair)
     check_options(layout, orientation)
     check_encoding(encoding)
-    if height is not None and not 1 <= height <= _MAX_HEIGHT:
+    if height is not None and not 1 <= check_size("height", height, 0) <= _MAX_HEIGHT:
         raise ValueError(f"height must be between 1 and {_MAX_HEIGHT}, got {height}")
-    paths = [Path(p) for p in ([path] if isinstance(path, str | os.PathLike) else path)]
+    paths = [as_path(p) for p in (path if isinstance(path, list | tuple) else [path])]
     if len(paths) != 1 and (layout != "cube" or len(paths) != 6):
         raise ValueError(f"layout {layout or 'lat-long'!r} does not come in {len(paths)} files")
     faces = [_read(p, encoding, layer, repair) for p in paths]
@@ -200,7 +205,7 @@ def studio(height: int = 256, width: int = 512) -> Float[Array, "height width 3"
     >>> imaging.studio(8, 16).shape
     (8, 16, 3)
     """
-    if height < 1 or width < 1:
+    if check_size("height", height, 0) < 1 or check_size("width", width, 0) < 1:
         raise ValueError(f"a picture needs pixels, got {width} × {height}")
     theta = (np.arange(height)[:, None] + 0.5) * np.pi / height
     phi = (np.arange(width) + 0.5) * 2 * np.pi / width

@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import operator
 
 import equinox as eqx
 import jax
@@ -10,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from .._core.checks import is_concrete
+from .._core.checks import as_float, check_size, check_type, is_concrete
 from .._core.linalg import einsum
 from .._core.xla import keep_rows, rows_are_split
 from ..geometry import Mesh, RayScene, ray_scene
@@ -78,8 +77,11 @@ def rasterize(
     >>> raster.shape, raster.face.shape, raster.barycentric.shape
     ((6, 8), (12, 16), (12, 16, 3))
     """
-    if operator.index(samples) < 1:
-        raise ValueError(f"a pixel needs at least 1 sample along its side, got {samples}")
+    check_type("mesh", mesh, Mesh)
+    check_type("camera", camera, Camera)
+    samples = check_size("samples", samples)
+    if scene is not None:
+        check_type("scene", scene, RayScene)
     shape = (camera.height * samples, camera.width * samples)
     finer = dataclasses.replace(camera, height=shape[0], width=shape[1])
     scene = ray_scene(mesh) if scene is None else scene
@@ -117,16 +119,20 @@ def interpolate(
     >>> imaging.interpolate(raster, 0.5 * mesh.normals + 0.5, jnp.nan).shape
     (6, 8, 3)
     """
+    check_type("raster", raster, Raster)
+    values, background = as_float(values, "values"), as_float(background, "background")
     if values.ndim != 2:
         raise ValueError(f"expected values (v, c), one row per vertex, got shape {values.shape}")
     if is_concrete(raster.faces) and len(raster.faces):
         vertices = int(np.max(np.asarray(raster.faces))) + 1
         if vertices > len(values):
             raise ValueError(f"expected values for {vertices} vertices, got {len(values)}")
-    behind = jnp.asarray(background, values.dtype)
+    behind = background.astype(values.dtype)
     shape = (*raster.shape, values.shape[1])
-    if behind.ndim > 1 and behind.shape != shape:
-        raise ValueError(f"expected a background {shape}, got shape {behind.shape}")
+    if behind.shape not in ((), shape[2:], shape):
+        raise ValueError(
+            f"expected background as a number, {shape[2:]} or {shape}, got shape {behind.shape}"
+        )
     return _interpolate(raster, values, behind)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Array, Real
 
+from .._core.checks import as_path, described
 from ._files import decoded
 
 _DISPLAY, _LINEAR = (".png", ".jpg", ".jpeg"), (".exr", ".hdr")
@@ -44,7 +45,7 @@ def write_image(
     ...     imaging.write_image(pathlib.Path(folder) / "a" / "probe.png", image).name
     'probe.png'
     """
-    path, pixels = Path(path), np.asarray(image)
+    path, pixels = as_path(path), _array(image)
     suffix = path.suffix.lower()
     if suffix not in _DISPLAY + _LINEAR:
         raise ValueError(f"{path}: cannot write {suffix}, only {_DISPLAY + _LINEAR}")
@@ -69,6 +70,16 @@ def write_image(
     path.parent.mkdir(parents=True, exist_ok=True)
     _write(path, np.ascontiguousarray(pixels))
     return path
+
+
+def _array(image: object) -> np.ndarray:
+    try:
+        array = np.asarray(image)
+    except (TypeError, ValueError):  # lists of several lengths
+        array = np.asarray(None)
+    if array.dtype.kind not in "fiubc" and array.dtype.name != "bfloat16":
+        raise ValueError(f"expected image as an array of numbers, got {described(image)}")
+    return array
 
 
 def _signal(pixels: np.ndarray, encoding: str | None) -> np.ndarray:
@@ -107,7 +118,7 @@ def _is_coded(pixels: np.ndarray, encoding: str | None) -> bool:
     if floats and encoding is not None:
         raise ValueError(f'encoding="srgb" is for uint8 and uint16, got {pixels.dtype}')
     if not floats and pixels.dtype not in (np.uint8, np.uint16):
-        raise ValueError(f"a picture is of floats, uint8 or uint16, got {pixels.dtype}")
+        raise ValueError(f"expected an image of floats, uint8 or uint16, got {pixels.dtype}")
     if not floats and encoding != "srgb":
         raise ValueError(
             f'integers ({pixels.dtype}) are no radiance: say encoding="srgb", or decode them by '

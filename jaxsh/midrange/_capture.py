@@ -8,7 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from .._core.checks import as_float, check_size, is_concrete
+from .._core.checks import (
+    as_finite,
+    check_choice,
+    check_size,
+    check_type,
+    check_vectors,
+)
 from ._analytic import capture_shapes
 from ._cube import RadianceCube, texels
 from ._emitters import Polygon, Sphere
@@ -62,15 +68,12 @@ def capture(
     ((384, 3), 1.6)
     """
     resolution = check_size("resolution", resolution)
-    point = as_float(point)
-    if point.ndim == 0 or point.shape[-1] != 3:
-        raise ValueError(f"expected points (..., 3), got shape {point.shape}")
-    if is_concrete(point) and not jnp.isfinite(point).all():
-        raise ValueError("points must be finite, got NaN or infinity")
+    check_type("scene", scene, Scene)
+    check_choice("rays", rays, ("embree", "analytic"))
+    point = as_finite(point, "point", wait=True)
+    check_vectors("point", point)
     if rays == "analytic":
         return _analytic(scene, point, resolution)
-    if rays != "embree":
-        raise ValueError(f'expected rays "embree" or "analytic", got {rays!r}')
     points = np.asarray(point, np.float64)
     batch, count = points.shape[:-1], 6 * resolution**2
     shapes = {

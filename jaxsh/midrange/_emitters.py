@@ -2,13 +2,17 @@
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, is_concrete
+from .._core.checks import as_finite, as_float, check_flag, check_type, is_concrete
 from ..geometry import Mesh
 
 # A vertex may be this far out of the plane, as a share of the polygon's extent.
 _FLAT = {np.dtype(np.float64): 1e-9, np.dtype(np.float32): 1e-5}
+
+
+def _as_radiance(value: ArrayLike) -> Float[Array, "..."]:
+    return as_finite(value, "radiance", wait=True)
 
 
 class Polygon(eqx.Module):
@@ -32,8 +36,8 @@ class Polygon(eqx.Module):
     ((4, 3), False)
     """
 
-    vertices: Float[Array, "n 3"] = eqx.field(converter=as_float)
-    radiance: Float[Array, " 3"] = eqx.field(converter=as_float)
+    vertices: Float[Array, "n 3"] = eqx.field(converter=lambda v: as_float(v, "vertices"))
+    radiance: Float[Array, " 3"] = eqx.field(converter=_as_radiance)
     two_sided: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
@@ -42,8 +46,7 @@ class Polygon(eqx.Module):
             raise ValueError(f"expected at least 3 vertices (n, 3), got shape {shape}")
         if self.radiance.shape != (3,):
             raise ValueError(f"expected radiance (3,), got shape {self.radiance.shape}")
-        if is_concrete(self.radiance) and not np.isfinite(self.radiance).all():
-            raise ValueError(f"a polygon's radiance must be finite, got {self.radiance}")
+        check_flag("two_sided", self.two_sided)
         if is_concrete(self.vertices):
             _check_vertices(np.asarray(self.vertices))
 
@@ -122,19 +125,17 @@ class Sphere(eqx.Module):
     (3,)
     """
 
-    center: Float[Array, " 3"] = eqx.field(converter=as_float)
-    radius: Float[Array, ""] = eqx.field(converter=as_float)
-    radiance: Float[Array, " 3"] = eqx.field(converter=as_float)
+    center: Float[Array, " 3"] = eqx.field(converter=lambda v: as_finite(v, "center", wait=True))
+    radius: Float[Array, ""] = eqx.field(converter=lambda v: as_finite(v, "radius", wait=True))
+    radiance: Float[Array, " 3"] = eqx.field(converter=_as_radiance)
 
     def __check_init__(self):
         for name, shape in (("center", (3,)), ("radius", ()), ("radiance", (3,))):
             value = getattr(self, name)
             if value.shape != shape:
                 raise ValueError(f"expected {name} of shape {shape}, got {value.shape}")
-            if is_concrete(value) and not np.isfinite(value).all():
-                raise ValueError(f"a sphere's {name} must be finite, got {value}")
-        if is_concrete(self.radius) and not self.radius > 0:
-            raise ValueError(f"a sphere's radius must be positive, got {self.radius}")
+        if is_concrete(self.radius) and not np.asarray(self.radius) > 0:
+            raise ValueError(f"a sphere's radius must be positive, got {float(self.radius):g}")
 
 
 class EmissiveMesh(eqx.Module):
@@ -153,10 +154,12 @@ class EmissiveMesh(eqx.Module):
     """
 
     mesh: Mesh
-    radiance: Float[Array, "*faces 3"] = eqx.field(converter=as_float)
+    radiance: Float[Array, "*faces 3"] = eqx.field(converter=_as_radiance)
     two_sided: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
+        check_type("mesh", self.mesh, Mesh)
+        check_flag("two_sided", self.two_sided)
         faces = len(self.mesh.faces)
         if self.radiance.shape not in ((3,), (faces, 3)):
             raise ValueError(

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_size
+from .._core.checks import align, as_float, check_size, check_type, check_vectors
 from .._core.linalg import einsum
 from ..harmonics import degree_of
 
@@ -34,8 +34,8 @@ class Expansion(eqx.Module):
     (2, 1, (3, 4, 3))
     """
 
-    point: Float[Array, "*batch 3"] = eqx.field(converter=as_float)
-    terms: Float[Array, "*batch 3 k m"] = eqx.field(converter=as_float)
+    point: Float[Array, "*batch 3"] = eqx.field(converter=lambda v: as_float(v, "point"))
+    terms: Float[Array, "*batch 3 k m"] = eqx.field(converter=lambda v: as_float(v, "terms"))
 
     def __check_init__(self):
         point, terms = self.point.shape, self.terms.shape
@@ -95,10 +95,10 @@ def make_expansion(
     >>> midrange.make_expansion(jnp.zeros(3), jnp.ones((3, 4)), jnp.ones((3, 4, 3))).order
     1
     """
-    coefficients = as_float(coefficients)[..., None]
+    coefficients = as_float(coefficients, "coefficients")[..., None]
     if gradient is None:
         return Expansion(point, coefficients)
-    gradient = as_float(gradient)
+    gradient = as_float(gradient, "gradient")
     if gradient.shape != (*coefficients.shape[:-1], 3):
         raise ValueError(
             f"expected gradient {(*coefficients.shape[:-1], 3)} for coefficients "
@@ -117,6 +117,8 @@ def monomials(offsets: Float[Array, "*batch 3"], order: int) -> Float[Array, "*b
     >>> [round(float(m), 1) for m in midrange.monomials(jnp.array([1.0, 2.0, 3.0]), 1)]
     [1.0, 1.0, 2.0, 3.0]
     """
+    offsets, order = as_float(offsets, "offsets"), check_size("order", order, 0)
+    check_vectors("offsets", offsets)
     x, y, z = offsets[..., 0], offsets[..., 1], offsets[..., 2]
     return jnp.stack(monomial_list((x, y, z), order), axis=-1)
 
@@ -162,6 +164,7 @@ def extrapolate(
     >>> round(float(midrange.extrapolate(expansion, jnp.full(3, 0.5))[0, 0]), 1)
     2.5
     """
+    check_type("expansion", expansion, Expansion)
     return _extrapolate(expansion, check_positions(positions).astype(expansion.terms.dtype))
 
 
@@ -177,7 +180,6 @@ def _extrapolate(expansion: Expansion, positions: Float[Array, "*batch 3"]) -> A
 
 def check_positions(positions: Float[ArrayLike, "*batch 3"]) -> Float[Array, "*batch 3"]:
     """Convert to floating point; raises `ValueError` unless the last axis is x, y, z."""
-    positions = as_float(positions)
-    if positions.shape[-1:] != (3,):
-        raise ValueError(f"expected positions (..., 3), got shape {positions.shape}")
+    positions = as_float(positions, "positions")
+    check_vectors("positions", positions)
     return positions

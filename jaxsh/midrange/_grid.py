@@ -3,7 +3,6 @@
 import functools
 import itertools
 import math
-import operator
 
 import equinox as eqx
 import jax
@@ -11,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import as_float, is_concrete
+from .._core.checks import as_finite, check_size, described, is_concrete
 from .._core.xla import on_mesh, rounded_once
 from ._expansion import check_positions
 from ._weights import Cells, Weights
@@ -38,20 +37,20 @@ class Grid(eqx.Module):
     (12, (12, 3))
     """
 
-    lower: Float[Array, " 3"] = eqx.field(converter=as_float)
-    upper: Float[Array, " 3"] = eqx.field(converter=as_float)
+    lower: Float[Array, " 3"] = eqx.field(converter=lambda v: as_finite(v, "lower", wait=True))
+    upper: Float[Array, " 3"] = eqx.field(converter=lambda v: as_finite(v, "upper", wait=True))
     shape: tuple[int, int, int] = eqx.field(static=True)
 
     def __check_init__(self):
-        if len(self.shape) != 3 or any(operator.index(n) < 2 for n in self.shape):
-            raise ValueError(f"expected a shape of three integers >= 2, got {self.shape}")
+        _check_shape(self.shape)
         if self.lower.shape != (3,) or self.upper.shape != (3,):
             raise ValueError(
                 f"expected bounds (3,), got shapes {self.lower.shape} and {self.upper.shape}"
             )
         known = is_concrete(self.lower) and is_concrete(self.upper)
         if known and not np.all(np.asarray(self.lower) < np.asarray(self.upper)):
-            raise ValueError(f"expected lower < upper, got {self.lower} and {self.upper}")
+            bounds = np.asarray(self.lower).tolist(), np.asarray(self.upper).tolist()
+            raise ValueError(f"expected lower < upper, got {bounds[0]} and {bounds[1]}")
 
     @property
     def points(self) -> Float[Array, "s 3"]:
@@ -124,10 +123,20 @@ def grid_around(positions: Float[ArrayLike, "v 3"], shape: tuple[int, int, int])
     0.707
     """
     positions = check_positions(positions)
+    _check_shape(shape)
+    if not positions.size:
+        raise ValueError(f"expected positions of at least one point, got shape {positions.shape}")
     lower, upper = (bound(positions.reshape(-1, 3), axis=0) for bound in (jnp.min, jnp.max))
     share = jnp.asarray([math.cos(math.pi / (2 * n)) for n in shape], positions.dtype)
     middle, half = (lower + upper) / 2, (upper - lower) / 2 * share
     return Grid(middle - half, middle + half, shape)
+
+
+def _check_shape(shape: tuple[int, int, int]) -> None:
+    if not isinstance(shape, tuple) or len(shape) != 3:
+        raise ValueError(f"expected shape as a tuple of three integers, got {described(shape)}")
+    for count in shape:
+        check_size("each number of the shape", count, 2)
 
 
 @functools.partial(jax.jit, static_argnums=3)

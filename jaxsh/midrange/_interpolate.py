@@ -2,13 +2,14 @@
 
 import functools
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, get_args
 
 import jax
 import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, ArrayLike, Float
 
+from .._core.checks import check_choice, check_type
 from .._core.linalg import matmul
 from .._core.xla import varying_as
 from ._expansion import Expansion, check_positions, monomials, term_orders
@@ -56,6 +57,9 @@ def interpolate(
     >>> midrange.interpolate(samples, weights, positions).shape
     (5, 3, 4)
     """
+    check_choice("rule", rule, get_args(Rule))
+    check_type("expansions", expansions, Expansion)
+    check_type("weights", weights, Weights)
     positions = check_positions(positions).astype(expansions.terms.dtype)
     if positions.ndim != 2:
         raise ValueError(f"expected positions (V, 3), got shape {positions.shape}")
@@ -94,11 +98,9 @@ def rule_terms(expansions: Expansion, rule: Rule) -> Float[Array, "*batch 3 k m"
         return expansions.terms
     if rule == "none":
         return expansions.terms[..., :1]
-    if rule == "half":
-        shares = [1 - q / (order + 1) for q in term_orders(order)]
-        shares = jnp.asarray(shares, expansions.terms.dtype)
-        return expansions.terms * shares.reshape((1,) * (expansions.terms.ndim - 1) + (-1,))
-    raise ValueError(f'expected rule "none", "half" or "full", got {rule!r}')
+    shares = [1 - q / (order + 1) for q in term_orders(order)]
+    shares = jnp.asarray(shares, expansions.terms.dtype)
+    return expansions.terms * shares.reshape((1,) * (expansions.terms.ndim - 1) + (-1,))
 
 
 def check_weights(expansions: Expansion, weights: Weights, count: int) -> None:

@@ -1,7 +1,6 @@
 """Places samples, and adds and removes them as objects move."""
 
 import dataclasses
-import operator
 import warnings
 from collections.abc import Callable
 from typing import Literal
@@ -11,6 +10,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Bool, Float
 
+from .._core.checks import (
+    as_host_float,
+    check_choice,
+    check_finite,
+    check_function,
+    check_number,
+    check_size,
+)
 from ..harmonics import clamped_cosine, convolve, degree_of
 from ._expansion import Expansion, extrapolate
 
@@ -68,9 +75,17 @@ def place_samples(
     >>> midrange.place_samples(positions, 4).shape
     (4, 3)
     """
-    positions = check_points(positions)
+    positions = check_points("positions", positions)
+    check_choice("method", method, ("kmeans", "farthest", "greedy"))
+    exponent = check_number("exponent", exponent, above=0.0)
+    checks, seed = check_size("checks", checks), check_size("seed", seed, 0)
+    candidates = check_size("candidates", candidates)
+    if target is not None:
+        target = check_number("target", target, least=0.0)
+    if evaluate is not None:
+        check_function("evaluate", evaluate)
     distinct = len(np.unique(positions, axis=0))
-    if not 1 <= operator.index(count) <= distinct:
+    if check_size("count", count) > distinct:
         raise ValueError(f"expected 1 to {distinct} samples (distinct positions), got {count}")
     if (method == "greedy") != (evaluate is not None) or (evaluate is None and target is not None):
         raise ValueError('expected evaluate with the method "greedy" and target only with it')
@@ -78,8 +93,6 @@ def place_samples(
         return _kmeans(positions, count, seed)
     if method == "farthest":
         return _farthest(positions, count)
-    if method != "greedy":
-        raise ValueError(f'expected method "kmeans", "farthest" or "greedy", got {method!r}')
     assert evaluate is not None
     clusters = _kmeans(positions, count, seed)
     pool = np.concatenate([clusters, _kmeans(positions, min(candidates, distinct), seed)])
@@ -214,14 +227,13 @@ def drawn_positions(positions: np.ndarray, count: int, seed: int) -> np.ndarray:
     return positions[rows]
 
 
-def check_points(positions: Float[ArrayLike, "v 3"]) -> Float[np.ndarray, "v 3"]:
+def check_points(name: str, points: Float[ArrayLike, "v 3"]) -> Float[np.ndarray, "v 3"]:
     """Convert to NumPy; raises `ValueError` unless (V, 3) with V >= 1 and finite."""
-    positions = np.asarray(positions)
-    if positions.ndim != 2 or positions.shape[1] != 3 or len(positions) == 0:
-        raise ValueError(f"expected positions (V, 3), V >= 1, got shape {positions.shape}")
-    if not np.issubdtype(positions.dtype, np.floating) or not np.isfinite(positions).all():
-        raise ValueError("expected positions that are finite floating-point numbers")
-    return positions
+    points = as_host_float(points, name)
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
+        raise ValueError(f"expected {name} (V, 3), V >= 1, got shape {points.shape}")
+    check_finite(name, points, wait=True)
+    return points
 
 
 def _irradiance(light) -> np.ndarray:
@@ -306,15 +318,23 @@ def update_samples(
     >>> len(update.points), update.removed
     (3, array([False]))
     """
-    points, candidates, positions = map(check_points, (points, candidates, positions))
-    release = target / 2 if release is None else release
+    points = check_points("points", points)
+    candidates, positions = (
+        check_points(name, value)
+        for name, value in (("candidates", candidates), ("positions", positions))
+    )
+    check_function("evaluate", evaluate)
+    exponent = check_number("exponent", exponent, above=0.0)
+    checks, seed = check_size("checks", checks), check_size("seed", seed, 0)
+    limit, target = check_size("limit", limit), check_number("target", target, least=0.0)
+    release = target / 2 if release is None else check_number("release", release)
     if not 0 <= release < target:
         raise ValueError(f"expected 0 <= release < target, got {release} and {target}")
     pool = np.concatenate([points, candidates.astype(points.dtype)])
     prediction = Prediction.of(evaluate, pool, drawn_positions(positions, checks, seed), exponent)
     choice = Choice(prediction, list(range(len(points))))
     if choice.error > target:
-        while choice.error > target and len(choice.chosen) < operator.index(limit):
+        while choice.error > target and len(choice.chosen) < limit:
             if not choice.add():
                 break
     else:

@@ -9,7 +9,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_batches, check_degree, is_concrete
+from .._core.checks import (
+    align,
+    as_float,
+    check_all,
+    check_batches,
+    check_degree,
+    check_type,
+    check_vectors,
+    is_concrete,
+)
 from .._core.xla import in_blocks
 from ._emitters import Polygon, is_convex
 from ._visible import Plan, Scene, seen
@@ -101,11 +110,12 @@ def polygon_harmonics_with_gradient(
 
 
 def _light(polygon, point, degree, horizon, blockers, gradient: bool):
-    point = as_float(point)
-    normals = jnp.zeros(3, point.dtype) if horizon is None else as_float(horizon)
-    for name, array in (("point", point), ("horizon", normals)):
-        if array.ndim == 0 or array.shape[-1] != 3:
-            raise ValueError(f"expected {name} (..., 3), got shape {array.shape}")
+    check_type("polygon", polygon, Polygon)
+    check_all("blockers", blockers, Polygon, least=0)
+    point = as_float(point, "point")
+    normals = jnp.zeros(3, point.dtype) if horizon is None else as_float(horizon, "horizon")
+    check_vectors("point", point)
+    check_vectors("horizon", normals)
     check_batches(point=point.shape, horizon=normals.shape)
     for blocker in blockers:
         if is_concrete(blocker.vertices) and not is_convex(np.asarray(blocker.vertices)):

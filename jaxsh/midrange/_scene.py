@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, is_concrete
+from .._core.checks import as_float, check_all, is_concrete
 from ..geometry import Mesh, RayScene, ray_scene
 from ..imaging import look_up
 from ..sphere import cube_map
@@ -48,11 +48,13 @@ class Scene:
         blockers: Sequence[Blocker] = (),
         environment: Float[ArrayLike, "h w 3"] | None = None,
     ):
+        check_all("emitters", emitters, Polygon, Sphere, EmissiveMesh, least=0)
+        check_all("blockers", blockers, Polygon, Sphere, Mesh, least=0)
+        if not emitters and environment is None:
+            raise ValueError("expected emitters or an environment: a scene without them is black")
         self.emitters, self.blockers = tuple(emitters), tuple(blockers)
         self.environment = None if environment is None else as_float(environment)
         self._skies: dict[int, np.ndarray] = {}
-        _check("emitters", self.emitters, (Polygon, Sphere, EmissiveMesh))
-        _check("blockers", self.blockers, (Polygon, Sphere, Mesh))
         if self.environment is not None and (
             self.environment.ndim != 3 or self.environment.shape[-1] != 3
         ):
@@ -112,10 +114,3 @@ def _texel_means(environment: Float[Array, "h w 3"], resolution: int) -> Float[n
         "fiajbc,fiajb->fijc", np.asarray(seen, np.float64).reshape(*cells, 3), weights
     )
     return (total / weights.sum(axis=(2, 4))[..., None]).reshape(-1, 3)
-
-
-def _check(name: str, things: Sequence[object], kinds: tuple[type, ...]) -> None:
-    for thing in things:
-        if not isinstance(thing, kinds):
-            said = ", ".join(kind.__name__ for kind in kinds)
-            raise ValueError(f"expected {name} of type {said}, got {type(thing).__name__}")

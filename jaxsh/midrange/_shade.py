@@ -2,14 +2,16 @@
 
 import functools
 import math
+from typing import get_args
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float
+from .._core.checks import align, check_choice, check_type
 from .._core.linalg import matmul
 from ..transfer import Transfer
+from ..transfer._glossy_kernels import checked_albedo
 from ._expansion import Expansion, monomial_list
 from ._interpolate import Rule, check_weights, over_samples, rule_terms, take_rows
 from ._weights import Weights
@@ -56,7 +58,13 @@ def shade(
     >>> midrange.shade(light, receivers, 0.5).shape
     (2, 3)
     """
-    albedo, count = as_float(albedo), len(transfer.coefficients)
+    check_choice("rule", rule, get_args(Rule))
+    check_type("expansions", expansions, Expansion)
+    check_type("transfer", transfer, Transfer)
+    if weights is not None:
+        check_type("weights", weights, Weights)
+    count = len(transfer.coefficients)
+    albedo = checked_albedo(albedo, count, transfer.dtype)
     if weights is None and (expansions.point.ndim != 1 or rule == "half"):
         raise ValueError(
             "without weights, expected the expansion around one point and the rule "
@@ -68,11 +76,6 @@ def shade(
         raise ValueError(
             f"the light's degree {expansions.degree} is above the transfer's, {transfer.degree}; "
             f"cut its terms to [..., :{transfer.coefficients.shape[-1]}, :]"
-        )
-    if albedo.shape not in ((), (3,), (count, 1), (count, 3)):
-        raise ValueError(
-            f"expected albedo as a number, (3,), ({count}, 1) or ({count}, 3), got shape "
-            f"{albedo.shape}"
         )
     return _shade(expansions, transfer.coefficients, transfer.positions, albedo, weights, rule)
 
@@ -111,7 +114,7 @@ def _shade(expansions, coefficients, positions, albedo, weights, rule):
     radiance = over_samples(add, jnp.zeros(positions.shape, dtype), values, points, terms)
     if cells is not None:
         radiance = radiance.reshape(-1, 3)[cells.place]
-    return jnp.multiply(*align(radiance, albedo.astype(dtype) / math.pi))
+    return jnp.multiply(*align(radiance, albedo / math.pi))
 
 
 def _products(coefficients, terms):

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_degree, is_concrete
+from .._core.checks import align, as_float, check_degree, check_type, check_vectors, is_concrete
 from ..harmonics import degrees, evaluate, evaluate_with_gradient
 from ._emitters import Sphere
 
@@ -61,9 +61,9 @@ def sphere_harmonics_with_gradient(
 
 
 def _light(sphere: Sphere, point, degree, gradient: bool):
-    point = as_float(point)
-    if point.ndim == 0 or point.shape[-1] != 3:
-        raise ValueError(f"expected point (..., 3), got shape {point.shape}")
+    check_type("sphere", sphere, Sphere)
+    point = as_float(point, "point")
+    check_vectors("point", point)
     center, radius, radiance = (
         x.astype(point.dtype) for x in (sphere.center, sphere.radius, sphere.radiance)
     )

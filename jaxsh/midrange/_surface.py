@@ -14,11 +14,20 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_degree, check_size, flatten_batch
+from .._core.checks import (
+    as_float,
+    check_all,
+    check_degree,
+    check_size,
+    check_type,
+    check_vectors,
+    flatten_batch,
+)
 from .._core.linalg import matmul
 from .._core.xla import in_turn
 from ..harmonics import evaluate, evaluate_with_gradient
 from ..sphere import fibonacci
+from ._emitters import EmissiveMesh, Polygon, Sphere
 from ._surfaces import Emitter, spheres, triangles
 
 
@@ -65,6 +74,7 @@ def surface_samples(emitters: Sequence[Emitter], count: int) -> SurfaceSamples:
     >>> samples.points.shape, round(float(samples.areas.sum()), 3)
     ((8, 3), 4.0)
     """
+    check_all("emitters", emitters, Polygon, Sphere, EmissiveMesh, least=0)
     m = math.isqrt(check_size("count", count) - 1) + 1
     nodes, weights = np.polynomial.legendre.leggauss(m)
     nodes, weights = (nodes + 1) / 2, weights / 2
@@ -135,9 +145,9 @@ def project_surface_with_gradient(
 
 
 def _at_points(project, samples, point, degree):
-    point = as_float(point)
-    if point.ndim == 0 or point.shape[-1] != 3:
-        raise ValueError(f"expected points (..., 3), got shape {point.shape}")
+    check_type("samples", samples, SurfaceSamples)
+    point = as_float(point, "point")
+    check_vectors("point", point)
     point = point.astype(samples.points.dtype)
     if point.ndim == 1:
         return project(samples, point, degree)

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._core.checks import check_degree
+from .._core.checks import check_choice, check_degree, check_type, described
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
 from .._core.xla import in_turn, keep_batch
@@ -55,8 +55,9 @@ def taylor(cube: RadianceCube, degree: int, order: int) -> Expansion:
     >>> expansion.order, expansion.terms.shape
     (2, (3, 4, 10))
     """
-    if order not in _ORDERS:
-        raise ValueError(f"order must be 0, 1, 2 or 3, got {order!r}")
+    check_type("cube", cube, RadianceCube)
+    if not isinstance(order, int | np.integer) or isinstance(order, bool) or order not in _ORDERS:
+        raise ValueError(f"order must be 0, 1, 2 or 3, got {described(order)}")
     tables = moment_tables(cube.resolution, check_degree(degree) + order, cube.radiance.dtype)
     return Expansion(cube.point, each(_terms, cube, tables, static=(degree, order)))
 
@@ -212,10 +213,10 @@ def project_cube_with_gradient(
     >>> c.shape, gradient.shape
     ((3, 4), (3, 4, 3))
     """
+    check_type("cube", cube, RadianceCube)
+    check_choice("gradient", gradient, ("surface", "edges"))
     if gradient == "surface":
         expansion = taylor(cube, degree, 1)
         return expansion.coefficients, expansion.gradient
-    if gradient == "edges":
-        table = edge_table(cube.resolution, check_degree(degree), cube.radiance.dtype)
-        return project_cube(cube, degree), each(edge_gradient, cube, table)
-    raise ValueError(f'gradient must be "surface" or "edges", got {gradient!r}')
+    table = edge_table(cube.resolution, check_degree(degree), cube.radiance.dtype)
+    return project_cube(cube, degree), each(edge_gradient, cube, table)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
-from .._core.checks import as_float
+from .._core.checks import as_float, check_number
 from .._core.linalg import matmul
 from ._expansion import check_positions
 
@@ -178,7 +178,7 @@ def _least_squares(
 
 def _check_places(positions, points) -> tuple[Float[Array, "v 3"], Float[Array, "s 3"]]:
     """Check both, and cast them to the dtype of the positions."""
-    positions, points = check_positions(positions), as_float(points)
+    positions, points = check_positions(positions), as_float(points, "points")
     if positions.ndim != 2 or points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
         raise ValueError(
             f"expected positions (V, 3) and at least one point (S, 3), got shapes "
@@ -246,9 +246,7 @@ def _total(rows: Float[Array, "s v"]) -> Float[Array, " v"]:
 
 
 def _check_exponent(exponent: float) -> float:
-    if not 0 < exponent < math.inf:
-        raise ValueError(f"expected an exponent > 0, got {exponent}")
-    return float(exponent)
+    return check_number("exponent", exponent, above=0.0)
 
 
 def _squared_length(offsets: Rows) -> Float[Array, "..."]:

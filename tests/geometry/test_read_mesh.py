@@ -133,7 +133,7 @@ def test_unknown_extension(tmp_path, name):
 
 
 def test_unknown_up(unchecked, tmp_path):
-    with pytest.raises(ValueError, match='up must be "z" or "y", got \'x\''):
+    with pytest.raises(ValueError, match="up must be one of z, y, got 'x'"):
         read_mesh(tmp_path / "a.ply", up="x")  # pyright: ignore[reportArgumentType]
 
 

@@ -21,6 +21,7 @@ from jaxsh.midrange import (
 from jaxsh.sphere import project_lat_long, reconstruct_lat_long
 
 # Cubes are projected at 64² texels and degree 2 throughout: one program of each form.
+NIGHT = np.zeros((2, 4, 3))
 RED, WHITE = np.array([1.0, 0, 0]), np.array([1.0, 1, 1])
 STAR = np.array([[0, 0, 0], [1, -0.1, 0], [0.4, 0.3, 0], [0.9, 1, 0], [-0.2, 0.8, 0.0]])
 LIGHT = rectangle([0.3, -0.2, 2], [0.6, 0.1, 0], [0, -0.5, 0.2])
@@ -77,7 +78,7 @@ def test_planes_distances_and_directions_agree():
 
 def test_solid_angles_are_exact():
     """Of a texel as a spherical quadrilateral: the sum of its angles less 2π."""
-    cube = capture(Scene([]), jnp.zeros(3), 3, rays="analytic")
+    cube = capture(Scene([], environment=NIGHT), jnp.zeros(3), 3, rays="analytic")
     corners = np.stack(np.meshgrid(*[np.linspace(-1, 1, 4)] * 2, indexing="ij"), -1)
     expected = []
     for i in range(3):
@@ -155,10 +156,14 @@ def test_the_sky_is_the_same_by_both_kinds_of_rays(rng):
         )
 
 
-def test_an_empty_scene_is_black_and_finite():
+def test_a_scene_without_light_is_refused_and_a_dark_one_is_black():
+    for blockers in ([], [BOX]):
+        with pytest.raises(ValueError, match="expected emitters or an environment"):
+            Scene([], blockers)
+    night = Scene([], environment=NIGHT)
     for cube in (
-        capture(Scene([]), np.zeros(3), 4),
-        capture(Scene([]), jnp.zeros(3), 64, rays="analytic"),
+        capture(night, np.zeros(3), 4),
+        capture(night, jnp.zeros(3), 64, rays="analytic"),
     ):
         assert not np.asarray(taylor(cube, 2, 1).terms).any()
 
@@ -246,24 +251,24 @@ def test_the_analytic_cube_differentiates_in_point_and_vertices():
 
 
 def test_refuses_what_is_no_scene_or_point(unchecked):
-    scene = Scene([])
-    with pytest.raises(ValueError, match="expected emitters of type Polygon"):
+    scene = Scene([], environment=NIGHT)
+    with pytest.raises(TypeError, match="expected emitters as all of Polygon"):
         Scene([BOX])
     with pytest.raises(ValueError, match="expected an environment"):
         Scene([], environment=np.zeros((4, 8)))
     with pytest.raises(ValueError, match="expected radiance"):
         EmissiveMesh(BOX, np.zeros((4, 3)))
     with pytest.raises(ValueError, match="takes polygons and spheres, got Mesh"):
-        capture(Scene([], [BOX]), np.zeros(3), 4, rays="analytic")
-    with pytest.raises(ValueError, match='expected rays "embree"'):
+        capture(Scene([], [BOX], NIGHT), np.zeros(3), 4, rays="analytic")
+    with pytest.raises(ValueError, match="rays must be one of embree"):
         capture(scene, np.zeros(3), 4, rays="embre")
-    with pytest.raises(ValueError, match="points must be finite"):
+    with pytest.raises(ValueError, match="point must be finite"):
         capture(scene, np.array([0, np.nan, 0]))
     for shoot in (
         lambda p, r: capture(scene, p, r),
         lambda p, r: capture(Scene([]), p, r, rays="analytic"),
     ):
-        with pytest.raises(ValueError, match=r"expected points \(..., 3\)"):
+        with pytest.raises(ValueError, match=r"expected point \(..., 3\)"):
             shoot(np.zeros(2), 4)
         with pytest.raises(ValueError, match="resolution must be an integer >= 1"):
             shoot(np.zeros(3), 0)

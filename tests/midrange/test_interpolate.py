@@ -215,5 +215,5 @@ def test_interpolation_errors(rng):
         interpolate(samples, weights, x[:2])
     with pytest.raises(ValueError, match=r"positions \(V, 3\)"):
         interpolate(samples, weights, np.zeros(3))
-    with pytest.raises(ValueError, match="expected rule"):
+    with pytest.raises(ValueError, match="rule must be one of"):
         interpolate(samples, weights, x, rule="third")  # pyright: ignore[reportArgumentType]

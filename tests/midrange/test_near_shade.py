@@ -114,7 +114,7 @@ def test_near_shade_errors(rng):
             wrong()
     with pytest.raises(ValueError, match="expansions of 2 samples"):
         shade(one, transfer, 1.0, weights=weights)
-    with pytest.raises(ValueError, match="expected rule"):
+    with pytest.raises(ValueError, match="rule must be one of"):
         shade(many, transfer, 1.0, weights=weights, rule="x")  # pyright: ignore
     with pytest.raises(ValueError, match="above the transfer's"):
         shade(Expansion(np.zeros(3), np.zeros((3, 9, 4))), transfer, 1.0)

@@ -125,7 +125,7 @@ def test_placement_errors():
         place_samples(np.zeros(3), 1)
     with pytest.raises(ValueError, match="finite"):
         place_samples(np.full((2, 3), np.nan), 1)
-    with pytest.raises(ValueError, match="expected method"):
+    with pytest.raises(ValueError, match="method must be one of"):
         place_samples(x, 1, method="best")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ValueError, match="expected evaluate"):
         place_samples(x, 1, method="greedy")

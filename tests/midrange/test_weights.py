@@ -153,7 +153,7 @@ def test_grid_around_keeps_off_the_box(rng):
 def test_weight_errors():
     x, p = np.zeros((4, 3)), np.ones((2, 3))
     for make in (inverse_distance_weights, moving_least_squares_weights):
-        with pytest.raises(ValueError, match="exponent > 0"):
+        with pytest.raises(ValueError, match="exponent must be a number > 0"):
             make(x, p, exponent=0.0)
         with pytest.raises(ValueError, match="at least one point"):
             make(x, p[:0])
