@@ -83,7 +83,7 @@ def test_camera_passes_through_jit():
         ({"target": (0.0, -2.0, 0.0)}, "target must differ from position"),
         ({"target": (0.0, -2.0, 5.0)}, "up must not be along the view"),
         ({"up": (0.0, 0.0, 0.0)}, "up must not be along the view"),
-        ({"up": (0.0, 0.0, np.nan)}, "up must not be along the view"),
+        ({"up": (0.0, 0.0, np.nan)}, "up must be finite"),
     ],
 )
 def test_bad_cameras_are_refused(fields, message):
@@ -260,10 +260,12 @@ def test_background_may_be_a_picture_or_a_mark(sheet, rng, unchecked):
     np.testing.assert_array_equal(np.isnan(marked[..., 0]), ~np.asarray(raster.mask))
     gradient = jax.grad(lambda values: interpolate(raster, values, picture).sum())(sheet.vertices)
     np.testing.assert_allclose(gradient.sum(), 3 * float(raster.alpha.sum()), rtol=1e-5)
-    with pytest.raises(ValueError, match=r"expected a background \(6, 8, 3\), got .*\(8, 6, 3\)"):
+    with pytest.raises(
+        ValueError, match=r"expected background .* or \(6, 8, 3\), got .*\(8, 6, 3\)"
+    ):
         interpolate(raster, sheet.vertices, picture.transpose(1, 0, 2))
 
 
 def test_samples_must_be_there(sheet):
-    with pytest.raises(ValueError, match="at least 1 sample along its side, got 0"):
+    with pytest.raises(ValueError, match="samples must be an integer >= 1, got 0"):
         rasterize(sheet, Camera((0, -4, 0), (0, 0, 0)), samples=0)

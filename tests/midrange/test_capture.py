@@ -266,7 +266,7 @@ def test_refuses_what_is_no_scene_or_point(unchecked):
         capture(scene, np.array([0, np.nan, 0]))
     for shoot in (
         lambda p, r: capture(scene, p, r),
-        lambda p, r: capture(Scene([]), p, r, rays="analytic"),
+        lambda p, r: capture(scene, p, r, rays="analytic"),
     ):
         with pytest.raises(ValueError, match=r"expected point \(..., 3\)"):
             shoot(np.zeros(2), 4)

@@ -101,5 +101,5 @@ def test_refuses_what_gives_no_light_and_what_does_not_fit(unchecked):
         surface_samples([Polygon(LIGHT, RADIANCE)], 0)
     with pytest.raises(ValueError, match="expected n samples"):
         SurfaceSamples(np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(3), np.zeros((2, 3)))
-    with pytest.raises(ValueError, match=r"expected points \(..., 3\)"):
+    with pytest.raises(ValueError, match=r"expected point \(..., 3\)"):
         project_surface(every_kind(), jnp.zeros(2), 2)

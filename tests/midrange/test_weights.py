@@ -159,7 +159,7 @@ def test_weight_errors():
             make(x, p[:0])
         with pytest.raises(ValueError, match=r"expected positions"):
             make(x[:, :2], p)
-    with pytest.raises(ValueError, match="three integers >= 2"):
+    with pytest.raises(ValueError, match="each number of the shape must be an integer >= 2"):
         Grid(np.zeros(3), np.ones(3), (1, 2, 2))
     with pytest.raises(ValueError, match="lower < upper"):
         Grid(np.ones(3), np.zeros(3), (2, 2, 2))
