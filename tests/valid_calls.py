@@ -143,6 +143,24 @@ def of_transfer():
         "FixedView.__call__": of(
             t.fixed_view(made(), eye(), material()), light=light, finite="light"
         ),
+        "bake": of(
+            t.bake,
+            mesh=knot(),
+            degree=1,
+            directions=16,
+            shadows=True,
+            bounces=0,
+            albedo=0.5,
+            ray_bias=1e-4,
+            offset=None,
+            scene=None,
+            seed=0,
+            chunk=16,
+            checkpoint=None,
+            finite="albedo ray_bias",
+            free="checkpoint",
+            slow=True,
+        ),
         "fixed_light": of(t.fixed_light, light=light, transfer=made(), finite="light"),
         "fixed_view": of(
             t.fixed_view,
@@ -501,6 +519,10 @@ def of_geometry():
         "JaxRayScene": of(g.JaxRayScene, meshes=[mesh], slow=True),
         "JaxRayScene.closest_hit": of(scene.closest_hit, **rays, slow=True),
         "JaxRayScene.occluded": of(scene.occluded, **rays, max_distance=3.0, slow=True),
+        "from_trimesh": of(
+            g.from_trimesh, shape=g.to_trimesh(mesh), **made, free="normals origin", slow=True
+        ),
+        "to_trimesh": of(g.to_trimesh, mesh=mesh, host=True),
         "knot": of(g.knot, vertices=300, slow=True),
         "make_mesh": of(
             g.make_mesh,
@@ -764,7 +786,6 @@ MADE = {
     "sky": {"Axis", "FitError", "PreethamConstants", "SkyFit", "SkyWarning", "Solution"},
     "transfer": {
         "AbstractTransfer",
-        "bake",
         "QuantizedTransfer",
         "SampledTransfer",
     },

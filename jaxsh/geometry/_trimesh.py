@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._core.checks import check_flag, check_type
 from ._assemble import Origin, assemble, check_options
 from ._base_color import BaseColor
 from ._files._gltf_pictures import as_rgba
@@ -43,6 +44,7 @@ def from_trimesh(
     (24, 3)
     """
     check_options(normals, origin)
+    two_sided = check_flag("two_sided", two_sided)
     trimesh = _trimesh()
     parts: list[Any] = [shape]
     if isinstance(shape, trimesh.Scene):
@@ -80,6 +82,7 @@ def to_trimesh(mesh: Mesh) -> "trimesh.Trimesh":
     >>> geometry.to_trimesh(geometry.knot(300)).is_watertight
     True
     """
+    check_type("mesh", mesh, Mesh)
     trimesh = _trimesh()
     arrays = on_host(mesh)
     if reason := problem(arrays):

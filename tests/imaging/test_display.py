@@ -101,7 +101,9 @@ def test_reinhard_differentiates_and_compiles(rng):
 def test_bad_curves_are_refused(unchecked):
     with pytest.raises(ValueError, match="curve must be one of clip, reinhard, got 'aces'"):
         tone_map(jnp.ones(3), curve="aces")  # pyright: ignore[reportArgumentType]
-    with pytest.raises(ValueError, match=r"needs R, G, B in the last axis, got shape \(4, 1\)"):
+    with pytest.raises(
+        ValueError, match=r"expected image with R, G, B in the last axis, got shape \(4, 1\)"
+    ):
         tone_map(jnp.ones((4, 1)), curve="reinhard")
     for white in (0.0, -1.0, float("nan")):
         with pytest.raises(ValueError, match=f"white must be above 0, got {white}"):

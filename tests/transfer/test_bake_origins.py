@@ -264,5 +264,5 @@ def test_ray_bias_and_offset_exclude_each_other(unchecked):
     with pytest.raises(ValueError, match=r"expected ray_bias or offset, not both: got 0\.1 and 1"):
         bake(bodies.cube(), 1, ray_bias=0.1, offset=1)
     for wrong in (0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="offset must be finite and > 0"):
+        with pytest.raises(ValueError, match=r"offset must be (a number > 0|finite)"):
             bake(bodies.cube(), 1, offset=wrong)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from ... import geometry
-from ..._core.checks import check_degree
+from ..._core.checks import as_path, check_degree, check_size, check_type
 from ...geometry import Mesh, RayScene, ray_scene
 from .._transfer import Transfer
 from ._blind import why_blind
@@ -100,6 +100,11 @@ def bake(
     ((300, 9), 2)
     """
     degree = check_degree(degree)
+    seed = check_size("seed", seed, least=0)
+    if scene is not None:
+        check_type("scene", scene, RayScene)
+    if checkpoint is not None:
+        checkpoint = as_path(checkpoint, "checkpoint")
     check_arguments(mesh, directions, shadows, bounces, albedo, ray_bias, offset, chunk)
     normals = unit_normals(mesh)
     exact = unshadowed(normals, degree)

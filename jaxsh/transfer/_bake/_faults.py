@@ -1,6 +1,5 @@
 """Checks of `bake`: its arguments before the rays, unlit vertices after them."""
 
-import math
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -8,7 +7,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..._core.checks import check_size
+from ..._core.checks import (
+    as_host_float,
+    check_finite,
+    check_flag,
+    check_number,
+    check_size,
+    check_type,
+)
 from ...geometry import Mesh
 from ._blind import why_undefined
 
@@ -24,8 +30,8 @@ def check_arguments(
     chunk: int,
 ) -> None:
     """Raise `ValueError` that says which of `bake`'s arguments is wrong, and how."""
-    if not isinstance(mesh, Mesh):
-        raise ValueError(f"expected a jaxsh.geometry.Mesh, got {type(mesh).__name__}")
+    check_type("mesh", mesh, Mesh)
+    check_flag("shadows", shadows)
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     if len(vertices) == 0:
         raise ValueError("the mesh has no vertices")
@@ -42,17 +48,16 @@ def check_arguments(
     if bounces and not shadows:
         raise ValueError(f"bounces={bounces} needs rays, and shadows=False casts none")
     for name, value in (("ray_bias", ray_bias), ("offset", offset)):
-        if value is not None and not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be finite and > 0, got {value!r}")
+        if value is not None:
+            check_number(name, value, above=0.0)
     if ray_bias is not None and offset is not None:
         raise ValueError(f"expected ray_bias or offset, not both: got {ray_bias!r} and {offset!r}")
-    share = np.asarray(albedo)
+    share = as_host_float(albedo, "albedo")
     if share.shape not in ((), (len(vertices),)):
         raise ValueError(
             f"albedo must be a number or have shape ({len(vertices)},), got shape {share.shape}"
         )
-    if not (np.isfinite(share) & (share >= 0)).all():
-        raise ValueError("albedo must be finite and >= 0 everywhere")
+    check_finite("albedo", share, least=0.0, wait=True)
 
 
 def report(
