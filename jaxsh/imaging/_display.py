@@ -100,7 +100,7 @@ def tone_map(
     if curve == "reinhard" and image.shape[-1:] != (3,):
         raise ValueError(f"expected image with R, G, B in the last axis, got shape {image.shape}")
     if curve == "reinhard" and is_concrete(white) and not float(white) > 0:
-        raise ValueError(f"white must be above 0, got {float(white):g}")
+        raise ValueError(f"white must be above 0, got {float(white)}")
     return _tone_map(image, exposure, white, curve)
 
 
