@@ -229,6 +229,10 @@ def test_what_the_base_color_does_not_hold_is_said():
     material["extensions"] = {"KHR_materials_clearcoat": {"clearcoatTexture": {"index": 0}}}
     maps = "clearcoatTexture metallicRoughnessTexture normalTexture"
     assert said(gltf) == f"3 other maps of materials ignored ({maps})"
+    gltf = textured(encoded())
+    gltf.json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = [2, -1, 0.5, 1]
+    assert said(gltf) == "1 base colors beyond 0 to 1 cut off there"
+    assert read_gltf(Path("a.glb"), gltf.glb()).materials[0].factor == (1, 0, 0.5, 1)
     assert "give off light" in said(textured(encoded(), emissiveFactor=[0, 1, 0]))
     gltf = textured(encoded())
     gltf.json["extensions"] = {"KHR_materials_variants": {"variants": [{"name": "a"}] * 3}}

@@ -83,7 +83,10 @@ class Materials:
         if base is None:
             base = inner(fields, "pbrMetallicRoughness", owner)
             factor_key, texture_key = "baseColorFactor", "baseColorTexture"
-        r, g, b, a = numbers(base, factor_key, owner, 4, [1.0, 1.0, 1.0, 1.0])
+        factor = numbers(base, factor_key, owner, 4, [1.0, 1.0, 1.0, 1.0])
+        r, g, b, a = (min(max(value, 0.0), 1.0) for value in factor)
+        if factor != [r, g, b, a]:
+            self._document.note("base colors beyond 0 to 1 cut off there")
         if (text(fields, "alphaMode", owner) or "OPAQUE") != "OPAQUE":
             self._document.note("materials are cut out or blended by alpha, read as whole surfaces")
         if any(numbers(fields, "emissiveFactor", owner, 3, [0.0, 0.0, 0.0])):
