@@ -69,8 +69,8 @@ def _decode(document: Document, number: int, owner: str) -> tuple[Any, Integer[n
     try:
         mesh = DracoPy.decode(bytes(view))
         corners = np.asarray(mesh.faces, np.int64).reshape(-1)
-        document.size += sum(stored["data"].nbytes for stored in mesh.attributes)
-        document.spend(len(mesh.points))
+        unpacked = sum(stored["data"].nbytes for stored in mesh.attributes)
     except Exception as error:  # of any kind, where the bytes are damaged
         raise ValueError(f"{owner} has damaged bytes of {_NAME}: {error}") from None
+    document.size += unpacked
     return mesh, corners
