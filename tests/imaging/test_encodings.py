@@ -76,6 +76,14 @@ def test_an_interlaced_picture(tmp_path, pixels):
     check(tmp_path / "a.png", colors / 255)
 
 
+def test_a_picture_of_one_value_takes_few_bytes(tmp_path):
+    path = tmp_path / "a.png"
+    white = Image.new("RGB", (2048, 1024), "white").quantize(2)
+    white.save(path, bits=1, optimize=True)
+    assert path.stat().st_size < 3 * 2048 * 1024 / 2048
+    np.testing.assert_array_equal(read_environment(path, encoding="srgb"), 1)
+
+
 TURNED = {
     1: lambda p: p,
     2: lambda p: p[:, ::-1],

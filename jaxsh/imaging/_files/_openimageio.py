@@ -12,8 +12,8 @@ from ._color import REC709, converted, decoded, from_luminance_chroma, luminance
 from ._turn import order_of_exif, upright
 from ._window import fit_window
 
-# The best that the compression of these formats can do is some hundred numbers in a byte.
-_MAX_NUMBERS_PER_BYTE = 2048
+# What pictures of more than a few numbers compress to at best is some hundred numbers in a byte.
+_MAX_NUMBERS_PER_BYTE, _FEW_NUMBERS = 2048, 1 << 25
 _MAX_PIXELS = 1 << 28  # 3 GB of them
 # A picture that is nearly all black by default was damaged more likely than saved so.
 _MAX_FILLED = 64
@@ -162,7 +162,7 @@ def _check_size(spec: Any, path: Path) -> None:
     size, pixels = path.stat().st_size, spec.width * spec.height
     # A tile is held whole, however little of it the picture has.
     held = max(pixels, spec.tile_width * spec.tile_height)
-    if held * spec.nchannels > _MAX_NUMBERS_PER_BYTE * size:
+    if held * spec.nchannels > max(_FEW_NUMBERS, _MAX_NUMBERS_PER_BYTE * size):
         raise ValueError(
             f"damaged: {spec.width} × {spec.height} pixels cannot be in a file of {size} bytes"
         )
