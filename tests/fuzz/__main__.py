@@ -63,7 +63,7 @@ class Run:
             elif stage.value == COMPARING:
                 self.outcomes["crashed another package"] += 1
             else:
-                raise SystemExit(f"{self.kind}: a process did not start; FUZZ_STDERR=1 shows why")
+                raise SystemExit(f"{self.kind}: a process did not start; FUZZ_OUTPUT=1 shows why")
             self.begin(at.value + self.options.workers)
         return len(dead)
 

@@ -26,8 +26,9 @@ def work(kind, seed, indices, at, stage, found, peers) -> None:
     from fuzz_readers import Fault, check, limit_memory, without_compiling
 
     without_compiling()
-    if not os.environ.get("FUZZ_STDERR"):  # libraries talk there about damaged files
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    if not os.environ.get("FUZZ_OUTPUT"):  # libraries talk there about damaged files
+        for stream in (1, 2):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
     limit = resource.getrlimit(resource.RLIMIT_AS)
     memory = "/dev/shm"  # where files are in memory, on Linux
     with tempfile.TemporaryDirectory(dir=memory if os.path.isdir(memory) else None) as folder:
