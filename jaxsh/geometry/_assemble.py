@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import jax.numpy as jnp
@@ -25,6 +25,8 @@ Normals = str | float | int
 _LOST = 1e-3
 # Sizes of the mesh that they are large beside: below, a center does not help.
 _FAR = 8
+# Faces whose corners are held in float64 at a time.
+_BLOCK = 1 << 16
 
 
 def check_options(normals: Normals, origin: object) -> None:
@@ -85,13 +87,15 @@ def assemble(
     if normals == "file" and polygons.normals is not None:
         # Where the file's agree they are one vertex, whatever the faces around.
         knots = whole.faces
-        vectors, phrase = _from_file(polygons.normals[slots], whole)
+        vectors, phrase = _from_file(polygons.normals, slots, whole)
         found += phrase
         attributes.append(vectors)
     else:
         knots, at_knots = _knots(whole, normals)
-    uv = None if polygons.uv is None else _uv(polygons.uv[slots])
-    colors = None if polygons.colors is None else _linear(polygons.colors[slots], encoding)
+    uv = None if polygons.uv is None else _in_blocks(_uv, polygons.uv, slots)
+    colors = None
+    if polygons.colors is not None:
+        colors = _in_blocks(lambda rows: _linear(rows, encoding), polygons.colors, slots)
     attributes += [a for a in (uv, colors) if a is not None]
     found += whole.found
     if found:
@@ -134,28 +138,52 @@ def _knots(whole: Clean, normals: Normals):
     return knots, vertex_normals(jnp.asarray(vertices), jnp.asarray(knots))
 
 
-def _from_file(given: np.ndarray, whole: Clean) -> tuple[np.ndarray, list[str]]:
+def _in_blocks(
+    function: Callable[[np.ndarray], np.ndarray], values: np.ndarray, slots: np.ndarray
+) -> np.ndarray:
+    """Give what a function makes of the values at the corners of faces, in float32.
+
+    A block of faces at a time: all at once, in float64, they take ten times the memory of a file.
+    """
+    out = np.empty((*slots.shape, values.shape[1]), np.float32)
+    for start in range(0, len(slots), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        out[block] = function(values[slots[block]])
+    return out
+
+
+def _from_file(given: np.ndarray, slots: np.ndarray, whole: Clean) -> tuple[np.ndarray, list[str]]:
     """Take unit normals (f, 3, 3) from the file, smooth ones where it has none or bad ones."""
-    missing = np.isnan(given).all(axis=2)
-    with np.errstate(invalid="ignore"):
-        largest = np.abs(given).max(axis=2)
-        good = np.isfinite(largest) & (largest > 0)
-        scaled = given / np.where(good, largest, 1)[..., None]
-        unit = scaled / np.where(good, np.linalg.norm(scaled, axis=2), 1)[..., None]
-        # Of length 1 to float32's rounding: kept to the bit.
-        unit = np.where(np.abs(unit - given).max(axis=2, keepdims=True) < 1e-6, given, unit)
+    unit = _in_blocks(_unit, given, slots)
+    good = np.isfinite(unit).all(axis=2)
+    said = []
     if not good.all():
+        missing = int(np.isnan(given[slots[~good]]).all(axis=1).sum())
+        said = [
+            (int((~good).sum()) - missing, "zero or infinite normals replaced by smooth ones"),
+            (missing, "corners without a normal given a smooth one"),
+        ]
         knots, smooth = _knots(whole, "smooth")
         unit = np.where(good[..., None], unit, np.asarray(smooth)[knots])
-    unit = unit.astype(np.float32) + np.float32(0)
-    a, b, c = np.moveaxis(whole.vertices[whole.faces].astype(np.float64), 1, 0)
-    behind = (np.einsum("fki,fi->fk", unit, np.cross(b - a, c - a)) < 0).all(axis=1)
-    said = [
-        (int((~good & ~missing).sum()), "zero or infinite normals replaced by smooth ones"),
-        (int(missing.sum()), "corners without a normal given a smooth one"),
-        (int(behind.sum()), "faces whose normals point against the order of their corners"),
-    ]
+    behind = 0
+    for start in range(0, len(slots), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        a, b, c = np.moveaxis(whole.vertices[whole.faces[block]].astype(np.float64), 1, 0)
+        along = np.einsum("fki,fi->fk", unit[block], np.cross(b - a, c - a))
+        behind += int((along < 0).all(axis=1).sum())
+    said.append((behind, "faces whose normals point against the order of their corners"))
     return unit, [f"{count} {what}" for count, what in said if count]
+
+
+def _unit(normals: np.ndarray) -> np.ndarray:
+    """Give normals (f, 3, 3) the length 1, NaN where they have no direction."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # First by the largest component: squares of very long or short ones leave the range.
+        unit = normals / np.abs(normals).max(axis=2, keepdims=True)
+        unit /= np.linalg.norm(unit, axis=2, keepdims=True)
+        # Of length 1 to float32's rounding: kept to the bit.
+        unit = np.where(np.abs(unit - normals).max(axis=2, keepdims=True) < 1e-6, normals, unit)
+    return unit + 0.0
 
 
 def _uv(uv: np.ndarray) -> np.ndarray:

@@ -4,6 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+# Faces whose corners are held in float64 at a time: all at once they take more than the file.
+_BLOCK = 1 << 16
+
 
 class Clean(NamedTuple):
     """Holds what is left of raw vertices and faces, joined where positions are equal."""
@@ -98,10 +101,13 @@ def first_of_equals(rows: np.ndarray) -> np.ndarray:
     # Rows that are equal have one hash, and are found by sorting that alone.
     key = np.zeros(len(bits), np.uint64)
     for column in bits.T:
-        key = (key ^ column) * np.uint64(0x9E3779B97F4A7C15)
+        key ^= column
+        key *= np.uint64(0x9E3779B97F4A7C15)
         key ^= key >> np.uint64(29)
     first = _first(key)
-    if (bits[first] != bits).any():  # two rows with one hash: sort all columns
+    if any(
+        (column[first] != column).any() for column in bits.T
+    ):  # two rows with one hash: sort all columns
         _, at, group = np.unique(bits, axis=0, return_index=True, return_inverse=True)
         first = at[group.reshape(-1)]
     return first.astype(np.int32)
@@ -139,8 +145,12 @@ def _repeats(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _has_area(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Tell whether a face is higher, over its longest edge, than float32 can tell from zero."""
-    corners = vertices[faces].astype(np.float64)
-    edges = np.roll(corners, -1, axis=1) - corners
-    longest_squared = (edges**2).sum(axis=2).max(axis=1)
-    twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    return twice_area > np.finfo(np.float32).eps * longest_squared
+    has_area = np.empty(len(faces), bool)
+    for start in range(0, len(faces), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        corners = vertices[faces[block]].astype(np.float64)
+        edges = np.roll(corners, -1, axis=1) - corners
+        longest_squared = (edges**2).sum(axis=2).max(axis=1)
+        twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        has_area[block] = twice_area > np.finfo(np.float32).eps * longest_squared
+    return has_area

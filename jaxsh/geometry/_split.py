@@ -22,9 +22,14 @@ def split(
     Corners become one vertex where they agree in `faces` (the position), `knots` (the normal) and
     in all `attributes`. Vertices stand in the order of their `source` row, as in the file.
     """
-    names = np.stack([faces.ravel(), knots.ravel()], axis=1).astype(np.int32)
-    columns = [a.reshape(faces.size, -1).astype(np.float32).view(np.int32) for a in attributes]
-    first = first_of_equals(np.concatenate([names, *columns], axis=1))
+    width = 2 + sum(attribute.shape[2] for attribute in attributes)
+    rows = np.empty((*faces.shape, width), np.float32)
+    rows[..., :2].view(np.int32)[:] = np.stack([faces, knots], axis=2)
+    at = 2
+    for attribute in attributes:
+        rows[..., at : at + attribute.shape[2]] = attribute
+        at += attribute.shape[2]
+    first = first_of_equals(rows.reshape(faces.size, width))
     corner = np.flatnonzero(first == np.arange(len(first)))
     earliest = np.full(faces.size, np.iinfo(np.int64).max)
     np.minimum.at(earliest, first, source.ravel())

@@ -103,6 +103,8 @@ def _by_pillow(path: Path) -> Summary | None:
     with Image.open(path) as image:
         if image.getexif().get(274, 1) != 1 or image.mode not in ("RGB", "RGBA", "L", "LA", "P"):
             return None
+        if image.format == "TIFF" and 262 not in getattr(image, "tag_v2", {}):
+            return None  # it does not say whether 0 is black, as it must
         share = np.asarray(image.convert("RGB")) / 255
     linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return linear.mean(axis=(0, 1))
