@@ -352,3 +352,11 @@ def test_compressed_bytes_are_not_packed_twice():
             del gltf.json["buffers"]  # which grow
         gltf.entry("nodes", mesh=copy + 1)
     refuses(gltf, "packs bytes that another bufferView packs as well")
+
+
+def test_a_skin_has_no_instances():
+    gltf = Gltf(skins=[{"joints": [0]}])
+    gltf.mesh()
+    copies = {"attributes": {"TRANSLATION": gltf.add(np.float32([[1, 2, 3]]))}}
+    gltf.entry("nodes", mesh=0, skin=0, extensions={"EXT_mesh_gpu_instancing": copies})
+    refuses(gltf, "node 0 has both a skin and EXT_mesh_gpu_instancing")
