@@ -12,7 +12,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from .checks import said_dtype
+from .checks import check_finite, is_concrete, said_dtype
 
 
 def as_radiance(name: str, value: Any) -> Float[Array, "..."]:
@@ -58,6 +58,12 @@ def check_shape(name: str, shape: tuple[int, ...], *, lat_long: bool = False) ->
             _check_lat_long(name, *shape[:2])
         return
     raise ValueError(f"expected {name} (height, width, channels), got shape {shape}{hint}")
+
+
+def check_values(name: str, picture: Array) -> None:
+    """Refuse NaN and infinities of a picture at hand on a CPU, at which it looks once."""
+    if is_concrete(picture) and next(iter(picture.devices())).platform == "cpu":
+        check_finite(name, picture, wait=True)
 
 
 def check_result(name: str, picture: Array, result: Array) -> None:

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._core.pictures import as_picture, as_radiance
+from .._core.pictures import as_picture, as_radiance, check_values
 from .._core.xla import keep_rows, rounded_once
 from ._camera import Camera
 
@@ -21,7 +21,8 @@ def look_up(
     `environment`. Directions need no unit length, if their squares stay in range; zero is taken
     for +z. Between the outermost pixel centers and a pole the look-up runs to the mean of the
     outermost row, so that the pole has one value from all sides. Raises `ValueError` for wrong
-    shapes, also of a picture that is less than 1.5 times as wide as high, and for integers.
+    shapes, also of a picture that is less than 1.5 times as wide as high, for integers, and, on a
+    CPU, for a picture with NaN or infinite values, at which it looks once.
 
     Linear and differentiable in `environment`; in the directions too, with kinks between pixels,
     where a slope is that of one side, and zero slope at the poles. Runs under `jit` and `vmap`;
@@ -36,6 +37,7 @@ def look_up(
     (2, 3)
     """
     environment = as_picture("environment", environment, lat_long=True)
+    check_values("environment", environment)
     directions = as_radiance("directions", directions)
     if directions.ndim == 0 or directions.shape[-1] != 3:
         raise ValueError(
@@ -59,7 +61,9 @@ def backdrop(environment: Float[Array, "height width c"], camera: Camera) -> Flo
     """
     if not isinstance(camera, Camera):
         raise TypeError(f"expected camera as a Camera, got {type(camera).__name__}")
-    return _backdrop(as_picture("environment", environment, lat_long=True), camera)
+    environment = as_picture("environment", environment, lat_long=True)
+    check_values("environment", environment)
+    return _backdrop(environment, camera)
 
 
 @eqx.filter_jit

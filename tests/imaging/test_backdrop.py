@@ -141,6 +141,11 @@ def test_other_shapes_are_refused(unchecked):
             look_up(environment, directions)
         with pytest.raises(ValueError, match=message):
             backdrop(environment, camera)
+    spoilt = jnp.ones((4, 8, 3)).at[1, 2, 0].set(jnp.nan)
+    for call in (lambda e: look_up(e, directions), lambda e: backdrop(e, camera)):
+        with pytest.raises(ValueError, match="environment must be finite, got nan in 1 of 96"):
+            call(spoilt)
+    assert jnp.isnan(jax.jit(look_up)(spoilt, jnp.asarray(painters.jaxsh_lat_long(4)))).any()
     with pytest.raises(ValueError, match=r"expected directions \(..., 3\).* got shape \(3, 5\)"):
         look_up(jnp.ones((4, 8, 3)), jnp.ones((3, 5)))
     with pytest.raises(TypeError, match="expected camera as a Camera, got tuple"):
