@@ -174,6 +174,7 @@ def test_ply_of_any_order_line_end_and_type(tmp_path, form, end):
     header = [
         "comment format ascii 1.0 end_header element face 9",
         "obj_info anything",
+        "of a comment that goes on",
         "element camera 1",
         *["property list ushort short view", "property double f"],
         "element vertex 4",
@@ -193,8 +194,8 @@ def test_ply_of_any_order_line_end_and_type(tmp_path, form, end):
     head = end.join(["ply", f"format {form} 1.0", *header, "end_header", ""]).encode()
     mesh, said = read(tmp_path / "a.ply", head + (body if order else body.encode()))
     assert said == (
-        "properties of faces ignored (flags area), 1 elements 'camera' ignored, 2 duplicate faces "
-        "dropped"
+        "1 lines of the header ignored, properties of faces ignored (flags area), 1 elements "
+        "'camera' ignored, 2 duplicate faces dropped"
     )
     np.testing.assert_array_equal(mesh.vertices, SQUARE)
     assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]

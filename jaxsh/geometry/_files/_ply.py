@@ -32,7 +32,7 @@ def read_ply(path: Path, data: bytes) -> Polygons:
     """
     header = read_header(data)
     elements = read_elements(header)
-    found: list[str] = []
+    found = [f"{header.ignored} lines of the header ignored"] if header.ignored else []
     vertex = elements.get("vertex", {})
     used: set[str] = set()
     positions = _columns(vertex, [("x", "y", "z")], used)

@@ -35,6 +35,7 @@ class Header(NamedTuple):
     elements: list[Element]
     order: str  # "<" or ">" for binary, "" for text
     comments: list[str]
+    ignored: int  # lines that say nothing known
     body: bytes
 
 
@@ -55,7 +56,7 @@ def read_header(data: bytes) -> Header:
     if not end:
         raise ValueError("it does not begin with 'ply'")
     elements: list[Element] = []
-    order, comments, at = None, [], end.end()
+    order, comments, ignored, at = None, [], 0, end.end()
     while True:
         stop = data.find(end[1], at)
         if stop < 0:
@@ -83,11 +84,13 @@ def read_header(data: bytes) -> Header:
                 elements[-1].properties.append(Property(name.lower(), _TYPES[kind], _TYPES[size]))
             case ["property", kind, name] if elements and kind in _TYPES:
                 elements[-1].properties.append(Property(name.lower(), _TYPES[kind]))
-            case _:
+            case ["element" | "property" | "format", *_]:
                 raise ValueError(f"its header has the line {line[:60]!r}")
+            case _:  # a comment broken in two, say
+                ignored += 1
     if order is None:
         raise ValueError("its header names no format")
-    return Header(elements, order, comments, data[at:])
+    return Header(elements, order, comments, ignored, data[at:])
 
 
 def read_elements(header: Header) -> dict[str, Columns]:
