@@ -82,19 +82,14 @@ def _by_openimageio(path: Path) -> Summary | None:
     return np.broadcast_to(pixels, (*pixels.shape[:2], 3)).astype(np.float64).mean(axis=(0, 1))
 
 
-def _by_pfm_tail(path: Path) -> Summary | None:
-    """Take the last numbers of a PFM, as many as its header asks for, and leave its scale out."""
-    data = path.read_bytes()
-    kind, width, height, scale = data.split(maxsplit=4)[:4]
-    count = int(width) * int(height) * {b"PF": 3, b"Pf": 1}[kind]
-    numbers = np.frombuffer(data[-4 * count :], "<f4" if float(scale) < 0 else ">f4")
-    return (
-        np.broadcast_to(
-            numbers.reshape(-1, count // int(width) // int(height)), (int(width) * int(height), 3)
-        )
-        .astype(np.float64)
-        .mean(axis=0)
-    )
+def _by_pfm_lines(path: Path) -> Summary | None:
+    """Take the numbers of a PFM whose header is three lines, and leave its scale out."""
+    kind, size, scale, numbers = path.read_bytes().split(b"\n", 3)
+    width, height = map(int, size.split())
+    channels = {b"PF": 3, b"Pf": 1}[kind.strip()]
+    order = "<f4" if float(scale) < 0 else ">f4"
+    pixels = np.frombuffer(numbers, order, width * height * channels).reshape(-1, channels)
+    return np.broadcast_to(pixels, (width * height, 3)).astype(np.float64).mean(axis=0)
 
 
 def _by_pillow(path: Path) -> Summary | None:
@@ -127,7 +122,7 @@ PEERS: dict[str, dict[str, Callable[[Path], Summary | None]]] = {
     **dict.fromkeys(MESHES, _MESHES),
     "hdr": {"OpenImageIO": _by_openimageio},
     "exr": {"OpenEXR": _by_openexr},
-    "pfm": {"NumPy": _by_pfm_tail},
+    "pfm": {"NumPy": _by_pfm_lines},
     "npy": {"NumPy": _by_numpy},
     **{kind: {"Pillow": _by_pillow} for kind in CODES},
     "npz": {"NumPy": _by_numpy_zip},

@@ -168,7 +168,7 @@ HARMLESS = {
         "a comment": in_header(b"PF\n", b"PF\n# made by hand\n"),
         "one line": lambda data: data[:7].replace(b"\n", b" ") + data[7:],
     },
-    ("npy", 0): {"version 2": version_2, "padding": lambda data: data + bytes(12)},
+    ("npy", 0): {"version 2": version_2, "padding": lambda data: data + bytes(16)},
     ("png", 0): {"a comment": png_text},
     ("gltf", 0): {"spaces": to(b" \n"), "byte-order mark": lambda data: b"\xef\xbb\xbf" + data},
     ("npz", 0): {"packed, in another order, with more": repacked},

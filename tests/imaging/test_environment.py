@@ -221,10 +221,18 @@ def test_padding_is_no_harm(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     path.write_bytes(encoded(tmp_path, suffix))
     image = read_environment(path)
-    path.write_bytes(path.read_bytes() + b"\n" + bytes(9))
-    np.testing.assert_array_equal(read_environment(path), image)
-    path.write_bytes(path.read_bytes() + b"more")
-    with pytest.raises(ValueError, match="takes 1536 bytes, but 1550 are there"):
+    whole = path.read_bytes()
+    for padding in (b"\n", b"\r\n", bytes(16), bytes(4000)):
+        path.write_bytes(whole + padding)
+        np.testing.assert_array_equal(read_environment(path), image)
+    # A byte too many among numbers that end in zeros shifts them; it is no padding.
+    shifted = whole[:-301] + b"\0" + whole[-301:-12] + bytes(12)
+    for data in (shifted, whole + bytes(7), whole + b" " * 20):
+        path.write_bytes(data)
+        with pytest.raises(ValueError, match=r"damaged: shape .* takes"):
+            read_environment(path)
+    path.write_bytes(whole + b"more")
+    with pytest.raises(ValueError, match="takes 1536 bytes, but 1540 are there"):
         read_environment(path)
 
 

@@ -55,7 +55,10 @@ def _numbers(body: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarray
     size = math.prod(shape) * dtype.itemsize
     if min(shape) < 1:
         raise ValueError(f"a picture needs pixels, got shape {shape}")
-    # Padding is no harm; anything else beyond the end says that the shape is wrong.
-    if len(body) < size or body[size:].strip(b"\0 \t\r\n"):
+    # A line end or many zeros are padding. Anything else behind them says that the shape is wrong
+    # or that bytes too many stand before it: the last of a number often is zero.
+    padding = body[size:]
+    padded = padding in (b"", b"\n", b"\r\n") or (len(padding) >= 16 and not padding.strip(b"\0"))
+    if len(body) < size or not padded:
         raise ValueError(f"damaged: shape {shape} takes {size} bytes, but {len(body)} are there")
     return np.frombuffer(body[:size], dtype)
