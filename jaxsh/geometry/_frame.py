@@ -82,10 +82,10 @@ class Frame(NamedTuple):
     def limits(
         self, limits: Float[np.ndarray, " n"], ahead: Float[np.ndarray, " n"] | None
     ) -> Float[np.ndarray, " n"]:
-        """Map limits of distance into the frame; an array of its own."""
-        if self.plain and ahead is None:
-            return limits.copy()
+        """Map limits of distance into the frame; a float32 array of its own."""
         with np.errstate(over="ignore"):
+            if self.plain and ahead is None:
+                return limits.astype(np.float32)
             moved = limits.astype(np.float64) * self.scale
             return (moved if ahead is None else moved - ahead).astype(np.float32)
 

@@ -100,7 +100,7 @@ def paired(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def limits_of(max_distance: Any, count: int) -> np.ndarray:
-    """Give one float32 limit for each ray; one that all share is repeated without a copy."""
+    """Give one limit for each ray; one that all share is repeated without a copy."""
     max_distance = as_host_float(max_distance, "max_distance")
     if np.ndim(max_distance) not in (0, 1) or np.size(max_distance) not in (1, count):
         raise ValueError(
@@ -109,7 +109,7 @@ def limits_of(max_distance: Any, count: int) -> np.ndarray:
         )
     if np.isnan(max_distance).any():
         raise ValueError("max_distance holds NaN")
-    return np.broadcast_to(np.asarray(max_distance, np.float32), count)
+    return np.broadcast_to(max_distance, count)
 
 
 def prepared(

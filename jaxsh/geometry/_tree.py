@@ -61,10 +61,12 @@ def ray_tree(corners: Float[np.ndarray, "f 3 3"], frame: Frame) -> RayTree:
         both = np.concatenate([low, high], axis=1).reshape(-1, 12)
         boxes[2**level : 2 ** (level + 1)] = both
         low, high = np.minimum(low[::2], low[1::2]), np.maximum(high[::2], high[1::2])
+    with np.errstate(over="ignore"):  # of doubles beyond float32, which `trace` does not take
+        center, scale = frame.center.astype(np.float32), np.float64(frame.scale).astype(np.float32)
     return RayTree(
         jnp.asarray(boxes),
         jnp.asarray(corners[order].reshape(-1, 9)),
         jnp.asarray(order.astype(np.int32)),
-        jnp.asarray(frame.center, jnp.float32),
-        jnp.asarray(frame.scale, jnp.float32),
+        jnp.asarray(center),
+        jnp.asarray(scale),
     )

@@ -41,7 +41,7 @@ def why_blind(
     normals, origins, distance = normals[blind], start.positions[blind], start.distance[blind]
     seen = _seen(mesh, scene, blind, normals, origins)
     # Whether something lies between where the rays start and where they might at the nearest.
-    ahead = (distance - start.least[blind]).astype(np.float32)
+    ahead = distance - start.least[blind]
     crossed = np.zeros(len(blind), bool)
     far = (ahead > start.least[blind]) & start.chosen
     if far.any():

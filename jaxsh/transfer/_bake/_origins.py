@@ -22,7 +22,7 @@ _SINGLE = float(np.finfo(np.float32).eps)
 class Origins(NamedTuple):
     """Holds where the rays of V vertices start."""
 
-    positions: Float[np.ndarray, "v 3"]  # float32, or float64 where that is too coarse
+    positions: Float[np.ndarray, "v 3"]
     distance: Float[np.ndarray, " v"]  # off the surface
     least: Float[np.ndarray, " v"]  # that coordinates allow
     chosen: bool  # by the user, so that it may pass the next surface
@@ -61,11 +61,8 @@ def origins(
         aside = np.minimum(by, shortest[at] / 10)
         edge = rim[at]
         start[edge] += aside[edge, None] * inwards[at][edge]
-        return start.astype(np.float32) if fits else start
+        return start.astype(np.promote_types(vertices.dtype, np.float32))
 
-    # Whether the least distance is at least a few of the steps that float32 has there.
-    steps = _ULPS * _SINGLE * np.abs(vertices).max(axis=1)
-    fits = bool((steps <= least * (1 + 1e-6)).all())
     if automatic:
         distance = _within_gaps(scene, normals, distance, least, lifted)
     return Origins(lifted(distance, slice(None)), distance, least, not automatic)
@@ -82,7 +79,8 @@ def _rounding(
     if not single:  # most doubles have been single once
         with np.errstate(over="ignore"):
             single = bool((vertices.astype(np.float32) == vertices).all())
-    stored = (_SINGLE if single else float(np.finfo(np.float64).eps)) * largest
+    kind = np.finfo(np.float32 if single else np.float64)
+    stored = float(kind.eps) * largest + float(kind.smallest_subnormal)
     frame = getattr(scene, "frame", None)
     if frame is None:
         return np.maximum(stored, _SINGLE * np.maximum(extent, largest))
@@ -97,8 +95,7 @@ def _within_gaps(scene: RayScene, normals, distance, least, lifted) -> np.ndarra
     if not len(wide):
         return distance
     start = lifted(least[wide], wide)
-    ahead = (distance[wide] - least[wide]).astype(np.float32)
-    stopped = scene.occluded(start, normals[wide], ahead)
+    stopped = scene.occluded(start, normals[wide], distance[wide] - least[wide])
     if not stopped.any():
         return distance
     narrow = wide[stopped]
