@@ -8,8 +8,8 @@ from jaxtyping import Bool, Float, Int
 
 from ...geometry import Mesh, RayScene
 
-# In half-extents of the mesh. Measured on six scanned meshes: the error that the distance makes
-# falls with it down to 1e-5, where it is 0.02 to 0.2 %; 1e-4 makes 0.06 to 0.9 %.
+# In half-extents of the mesh. Against 3e-7, on seven scanned meshes, the coefficients' RMS error
+# is 0.02 to 0.7 %; 1e-4 makes 0.07 to 1.6 %, and no fewer vertices black that should not be.
 _SHARE = 1e-5
 # What a vertex's shortest edge allows, so that small parts of a large mesh keep their shadows.
 _OF_EDGE = 1e-3
