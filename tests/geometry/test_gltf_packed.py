@@ -293,6 +293,29 @@ def test_draco():
     np.testing.assert_allclose(polygons.uv, (uv * [1, -1] + [0, 1])[known], atol=1e-6)
 
 
+def test_draco_without_positions():
+    decode = pytest.importorskip("DracoPy").decode
+    gltf = draco()
+    (primitive,) = gltf.json["meshes"][0]["primitives"]
+    view = primitive["extensions"]["KHR_draco_mesh_compression"]["bufferView"]
+    start, size = (gltf.json["bufferViews"][view][key] for key in ("byteOffset", "byteLength"))
+    plain = bytes(gltf.bytes[start : start + size])
+
+    def changed(at: int) -> bytes:  # a position, 0, becomes a normal, 1
+        return plain[:at] + b"\1" + plain[at + 1 :]
+
+    def has_none(data: bytes) -> bool:
+        try:
+            return decode(data).points is None
+        except Exception:  # which the library raises as it likes
+            return False
+
+    at = next(at for at in range(size) if has_none(changed(at)))
+    gltf.bytes[start : start + size] = changed(at)
+    with pytest.raises(ValueError, match=r"damaged bytes of KHR_draco.*: no attribute is a pos"):
+        read_gltf(Path("a.glb"), gltf.glb({}))
+
+
 def test_draco_is_named_where_it_cannot_be_decoded(monkeypatch):
     pytest.importorskip("DracoPy")
     with pytest.raises(ValueError, match=r"announces 5 vertices, but KHR_draco.* packs 4"):
@@ -301,7 +324,7 @@ def test_draco_is_named_where_it_cannot_be_decoded(monkeypatch):
         read_gltf(Path("a.glb"), draco(type="VEC3").glb({}))
     gltf = draco()
     gltf.bytes[30:60] = bytes(30)
-    with pytest.raises(ValueError, match="damaged bytes of KHR_draco_mesh_compression"):
+    with pytest.raises(ValueError, match=r"damaged bytes of KHR_draco_mesh_compression"):
         read_gltf(Path("a.glb"), gltf.glb({}))
     gltf, plain = draco(), draco()
     monkeypatch.setitem(sys.modules, "DracoPy", None)

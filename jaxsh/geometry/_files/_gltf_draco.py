@@ -37,8 +37,7 @@ def decode_draco(
     number = whole(packed, "bufferView", owner)
     if number not in document.meshes:
         document.meshes[number] = _decode(document, number, owner)
-    mesh, corners = document.meshes[number]
-    found = len(mesh.points)
+    mesh, corners, found = document.meshes[number]
     announced = whole(position, "count", owner)
     if found != announced or corners.max(initial=0) >= found:
         raise ValueError(
@@ -61,7 +60,9 @@ def decode_draco(
     return unpacked, corners
 
 
-def _decode(document: Document, number: int, owner: str) -> tuple[Any, Integer[np.ndarray, " c"]]:
+def _decode(
+    document: Document, number: int, owner: str
+) -> tuple[Any, Integer[np.ndarray, " c"], int]:
     import DracoPy
 
     view, _ = view_bytes(document, number, owner)
@@ -69,8 +70,10 @@ def _decode(document: Document, number: int, owner: str) -> tuple[Any, Integer[n
     try:
         mesh = DracoPy.decode(bytes(view))
         corners = np.asarray(mesh.faces, np.int64).reshape(-1)
+        if mesh.points is None:
+            raise ValueError("no attribute is a position")
         unpacked = sum(stored["data"].nbytes for stored in mesh.attributes)
     except Exception as error:  # of any kind, where the bytes are damaged
         raise ValueError(f"{owner} has damaged bytes of {_NAME}: {error}") from None
     document.size += unpacked
-    return mesh, corners
+    return mesh, corners, len(mesh.points)
