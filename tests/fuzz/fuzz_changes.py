@@ -377,7 +377,7 @@ def _edit_archive(data: bytes, rng: Random, kind: str) -> bytes:
             members[name] = rng.choice(list(members.values()))
         case 8:
             # A header that asks for much, with zeros that pack into nothing.
-            return compressed_archive(members, {name: rng.choice([10**3, 10**5, 2 * 10**7])})
+            return compressed_archive(members, {name: rng.choice([10**3, 10**5, 5 * 10**6])})
     return compressed_archive(members, {}) if rng.random() < 0.3 else archive(members)
 
 

@@ -4,6 +4,7 @@ import faulthandler
 import os
 import resource
 import tempfile
+import time
 from pathlib import Path
 from random import Random
 
@@ -20,8 +21,11 @@ def made(kind: str, seed: int, index: int) -> bytes:
     return change(kind, rng.choice(seeds(kind)), rng)
 
 
-def work(kind, seed, indices, at, stage, found, peers) -> None:
-    """Put (index, fault or None, input or outcome) into `found`, an outcome for each input."""
+def work(kind, seed, indices, at, stage, spent, found, peers) -> None:
+    """Put (index, fault or None, input or outcome) into `found`, an outcome for each input.
+
+    `at`, `stage` and `spent` say where this process is and how much of a core's time it took.
+    """
     import fuzz_peers
     from fuzz_readers import Fault, check, limit_memory, without_compiling
 
@@ -36,6 +40,7 @@ def work(kind, seed, indices, at, stage, found, peers) -> None:
         put_beside(kind, path.parent)
         path.write_bytes(seeds(kind)[0])
         check(kind, path)  # what is loaded or compiled once counts against no input
+        began = time.process_time()
         for index in indices:
             data = made(kind, seed, index)
             path.write_bytes(data)
@@ -62,4 +67,5 @@ def work(kind, seed, indices, at, stage, found, peers) -> None:
                     found.put((index, said, data))
             faulthandler.cancel_dump_traceback_later()
             found.put((index, None, outcome))
+            spent.value = time.process_time() - began
     stage.value = DONE
