@@ -172,9 +172,13 @@ def _faces(words: Words, kinds: dict[str, np.ndarray], vertices: int, found: lis
         index = np.where(index < 0, index + so_far[line] + 1, index)
         total = int(so_far[-1]) if len(so_far) else 0
         wrong = (index > total) | (index < 0) | ((index == 0) & (named[:, column] < 0))
-        if column == 0:
+        if column > 0:
+            if lost := int(wrong.sum()):
+                what = "texture coordinates" if kind == "vt" else "normals"
+                found.append(f"{lost} corners name {what} that are not there")
+            index = np.where(wrong, 0, index)
+        elif (wrong | (index == 0)).any():
             wrong |= index == 0
-        if wrong.any():
             corner = int(wrong.argmax())
             raise ValueError(
                 f"line {words.line(int(at[corner]))} names {kind} {named[corner, column]}, but "

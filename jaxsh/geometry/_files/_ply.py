@@ -31,8 +31,8 @@ def read_ply(path: Path, data: bytes) -> Polygons:
     of their type.
     """
     header = read_header(data)
-    elements = read_elements(header)
     found = [f"{header.ignored} lines of the header ignored"] if header.ignored else []
+    elements = read_elements(header, found)
     vertex = elements.get("vertex", {})
     used: set[str] = set()
     positions = _columns(vertex, [("x", "y", "z")], used)

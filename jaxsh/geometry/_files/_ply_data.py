@@ -93,9 +93,9 @@ def read_header(data: bytes) -> Header:
     return Header(elements, order, comments, ignored, data[at:])
 
 
-def read_elements(header: Header) -> dict[str, Columns]:
+def read_elements(header: Header, found: list[str]) -> dict[str, Columns]:
     """Read all elements; of two with one name or two such properties the first stays."""
-    found: dict[str, Columns] = {}
+    read: dict[str, Columns] = {}
     if header.order == "":
         words = Words(plain_text(header.body))
         announced = sum(element.rows for element in header.elements if element.properties)
@@ -104,17 +104,17 @@ def read_elements(header: Header) -> dict[str, Columns]:
         row = 0
         for element in header.elements:
             if element.properties:
-                found.setdefault(element.name, _text_columns(words, element, row))
+                read.setdefault(element.name, _text_columns(words, element, row, found))
                 row += element.rows
     else:
         at = 0
         for element in header.elements:
             columns, at = _binary_columns(header, element, at)
-            found.setdefault(element.name, columns)
-    return found
+            read.setdefault(element.name, columns)
+    return read
 
 
-def _text_columns(words: Words, element: Element, row: int) -> Columns:
+def _text_columns(words: Words, element: Element, row: int, found: list[str]) -> Columns:
     first = words.first[row : row + element.rows]
     end = first + words.counts[row : row + element.rows]
     numbers = words.numbers(np.arange(first[0], end[-1])) if len(first) else np.zeros(0)
@@ -142,7 +142,8 @@ def _text_columns(words: Words, element: Element, row: int) -> Columns:
         else:
             values = _typed(values, kind)
         columns.setdefault(name, values)
-    check(at != end)
+    if more := int((at < end).sum()):
+        found.append(f"further values of {more} rows of {element.name!r} ignored")
     return columns
 
 

@@ -9,6 +9,7 @@ from ._polygons import Polygons
 from ._text import Words, plain_text
 
 _FACET = "facet normal ? ? ? outer loop vertex ? ? ? vertex ? ? ? vertex ? ? ? endloop endfacet"
+_TEXT = re.compile(rb"\bfacet\b|^[ \t]*end[ \t]*solid", re.I | re.M)
 _SOLID = re.compile(rb"(?m)^[ \t]*(end[ \t]*)?solid\b.*$")
 
 
@@ -20,7 +21,8 @@ def read_stl(path: Path, data: bytes) -> Polygons:
     count = int.from_bytes(data[80:84], "little")
     whole = 84 + 50 * count
     text = plain_text(data).lstrip()
-    if len(data) != whole and text[:5].lower() == b"solid" and b"facet" in text.lower():
+    named = text[:5].lower() == b"solid"
+    if len(data) != whole and named and _TEXT.search(text):
         return _text(text)
     if len(data) < max(whole, 84):
         raise ValueError(
