@@ -46,8 +46,8 @@ def read_picture(path: Path, encoding: str | None, layer: str | None, fill: bool
         if pixels.dtype.kind == "u":
             return Picture(_three(decoded(pixels, encoding)))
         refuse_encoding(encoding)
-        # What float32 cannot hold becomes infinite, and is met as such.
-        with np.errstate(over="ignore"):
+        # What float32 cannot hold becomes infinite, and is met as such; a NaN may be of any kind.
+        with np.errstate(over="ignore", invalid="ignore"):
             return Picture(_three(pixels.astype(np.float32)))
     except UnicodeDecodeError as error:  # names in the header, or the complaint about them
         raise ValueError("damaged: its header is not text") from error

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, Shaped
 
+from ..._core.words import reason
+
 _FORMAT = {"format": "jaxsh bake checkpoint", "version": 1}
 
 
@@ -88,7 +90,8 @@ def _check(path: Path, expected: dict[str, Any]) -> None:
         raise ValueError(f"{path}: not the checkpoint of a bake; it is left as it is")
     for name, value in expected.items():
         if found.get(name) != value:
+            said = reason(str(found.get(name)))
             raise ValueError(
-                f"{path}: the checkpoint of another bake: its {name} is {found.get(name)}, and "
+                f"{path}: the checkpoint of another bake: its {name} is {said}, and "
                 f"{value} here; it is left as it is"
             )
