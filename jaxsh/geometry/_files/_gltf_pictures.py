@@ -91,7 +91,7 @@ class Pictures:
     def _check_size(self, size: tuple[int, int], stored: int) -> None:
         # A byte seldom gives more than ten pixels; more are for plain pictures of moderate size.
         self._pixels += size[0] * size[1]
-        if self._pixels > 25_000_000 + 16 * (stored + self._document.size):
+        if self._pixels > 22_000_000 + 16 * (stored + self._document.size):
             raise ValueError(
                 f"{size[0]} × {size[1]} pixels are out of proportion to {stored} bytes"
             )

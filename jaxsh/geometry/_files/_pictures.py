@@ -11,7 +11,7 @@ from ..._core.words import reason
 from ._gltf_pictures import as_rgba
 
 # A byte seldom gives more than ten pixels; more are for plain pictures of moderate size.
-_PLAIN, _PER_BYTE = 25_000_000, 16
+_PLAIN, _PER_BYTE = 22_000_000, 16
 
 
 def beside(path: Path, name: str) -> Path | None:
