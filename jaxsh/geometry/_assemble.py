@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from .._core import srgb
 from .._core.checks import described
 from .._core.words import reason
 from ._clean import Clean, clean
@@ -200,7 +201,7 @@ def _linear(colors: np.ndarray, encoding: str) -> np.ndarray:
     colors = np.clip(colors, 0, 1e9)
     rgb = colors[..., :3]
     if encoding == "srgb":
-        rgb = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        rgb = srgb.decode(rgb)
     return np.concatenate([rgb, colors[..., 3:]], axis=2).astype(np.float32)
 
 

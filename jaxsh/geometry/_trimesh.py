@@ -4,12 +4,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._core import srgb
 from .._core.checks import check_flag, check_type
 from ._assemble import Origin, assemble, check_options
 from ._base_color import BaseColor
 from ._files._gltf_pictures import as_rgba
 from ._files._polygons import Polygons
-from ._files._write_arrays import on_host, problem, srgb
+from ._files._write_arrays import on_host, problem
 from ._mesh import Mesh
 
 if TYPE_CHECKING:
@@ -210,5 +211,5 @@ def _material(materials: tuple[BaseColor, ...]) -> Any:
 
 
 def _eight_bit(linear: np.ndarray) -> np.ndarray:
-    encoded = np.concatenate([srgb(linear[:, :3]), linear[:, 3:]], axis=1)
+    encoded = np.concatenate([srgb.encode(linear[:, :3]), linear[:, 3:]], axis=1)
     return np.round(255 * np.clip(encoded, 0, 1)).astype(np.uint8)

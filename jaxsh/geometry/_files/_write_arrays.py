@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 
 from .._base_color import BaseColor
 from .._mesh import Mesh
@@ -106,13 +105,6 @@ def has(arrays: Arrays, what: str) -> bool:
         case "materials":
             return len(arrays.materials) > 0
     return getattr(arrays, what) is not None
-
-
-def srgb(linear: np.ndarray) -> Float[np.ndarray, "..."]:
-    """Encode linear values by IEC 61966-2-1, in float64; what is negative keeps its sign."""
-    size = np.abs(linear.astype(np.float64))
-    curved = 1.055 * np.maximum(size, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.copysign(np.where(size <= 0.0031308, 12.92 * size, curved), linear)
 
 
 def rows_of_text(form: str, rows: np.ndarray) -> str:

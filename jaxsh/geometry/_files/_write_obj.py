@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from ..._core import srgb
 from .._base_color import BaseColor
-from ._write_arrays import Arrays, digits, rows_of_text, srgb
+from ._write_arrays import Arrays, digits, rows_of_text
 from ._write_png import png
 
 
@@ -16,7 +17,7 @@ def obj_files(arrays: Arrays, stem: str) -> dict[str, bytes]:
     number = digits(points)
     form = f"v {number} {number} {number}"
     if arrays.colors is not None:
-        points = np.concatenate([points, srgb(arrays.colors[:, :3])], axis=1)
+        points = np.concatenate([points, srgb.encode(arrays.colors[:, :3])], axis=1)
         form += " %.9g %.9g %.9g"
     shared, place = _unique_rows(points)
     text = rows_of_text(form + "\n", shared)

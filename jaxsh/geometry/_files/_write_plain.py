@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ._write_arrays import Arrays, digits, rows_of_text, srgb
+from ..._core import srgb
+from ._write_arrays import Arrays, digits, rows_of_text
 
 _PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int"}
 
@@ -39,7 +40,7 @@ def _little(dtype: np.dtype) -> str:
 
 def _ply_colors(linear: np.ndarray) -> np.ndarray:
     """Encode colors in bytes where these give them back, in floats elsewhere; alpha is linear."""
-    encoded = np.concatenate([srgb(linear[:, :3]), linear[:, 3:].astype(np.float64)], axis=1)
+    encoded = np.concatenate([srgb.encode(linear[:, :3]), linear[:, 3:].astype(np.float64)], axis=1)
     codes = np.rint(255 * np.clip(encoded, 0, 1))
     # Bytes decoded to float32 come this near; alike to float32's resolution.
     if np.abs(codes / 255 - encoded).max(initial=0) < 1e-7:

@@ -3,6 +3,8 @@
 import numpy as np
 from jaxtyping import Float, UInt
 
+from ..._core import srgb
+
 # x, y of red, green, blue and white (D65).
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
@@ -71,8 +73,8 @@ def decoded(
         )
     most = np.iinfo(pixels.dtype).max
     signal = np.arange(most + 1) / most
-    if encoding == "srgb":  # IEC 61966-2-1
-        signal = np.where(signal <= 0.04045, signal / 12.92, ((signal + 0.055) / 1.055) ** 2.4)
+    if encoding == "srgb":
+        signal = srgb.decode(signal)
     return signal.astype(np.float32)[pixels]
 
 
