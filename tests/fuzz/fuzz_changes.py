@@ -385,6 +385,7 @@ _MIXED = _BYTES + _TEXT
 _CHANGES = {
     "obj": _MIXED + _TEXT,
     "off": _MIXED + _TEXT,
+    "mtl": _MIXED + _TEXT,
     "ply": _MIXED + _TEXT,
     "stl": _MIXED,
     "glb": [*_BYTES, *[_edit_json] * 16, *[_edit_chunks] * 2],

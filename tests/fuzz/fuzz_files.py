@@ -53,6 +53,15 @@ def _obj() -> list[bytes]:
     return ["\n".join(text).encode() + b"\n" for text in (plain, full)]
 
 
+def _mtl() -> list[bytes]:
+    plain = b"newmtl red\nKd 1 0.5 0\nmap_Kd red.png\nnewmtl blue\nKd 0 0 1\nd 0.5\n"
+    full = (
+        b"# made by hand\nnewmtl red\n\tNs 96\nKa 1 1 1\nKd 0.5\nTr 0.25\nillum 2\n"
+        b"map_Kd -s 1 1 1 -o 0.5 0 red.png\n\nnewmtl  blue \nKd 0.25 0.5 1e0\nd -halo 1\n"
+    )
+    return [plain, full]
+
+
 def _off() -> list[bytes]:
     points = [" ".join(f"{c:g}" for c in p) for p in POINTS]
     faces = [" ".join(map(str, [len(p), *p])) for p in POLYGONS]
@@ -419,14 +428,16 @@ def _transfer() -> list[bytes]:
 
 # What a file may name, beside it.
 BESIDE = {
+    "mtl": {"scene.obj": _obj()[1], "red.png": _PNG},
     "obj": {
         "scene.mtl": b"newmtl red\nKd 1 0 0\nmap_Kd red.png\nnewmtl blue\nKd 0 0 1\nd 0.5\n",
         "red.png": _PNG,
-    }
+    },
 }
 
 _MAKERS = {
     "obj": _obj,
+    "mtl": _mtl,
     "ply": _ply,
     "stl": _stl,
     "off": _off,
@@ -442,13 +453,13 @@ _MAKERS = {
     "npz": _transfer,
 }
 FORMATS = tuple(_MAKERS)
-MESHES, PICTURES, CODES = FORMATS[:6], FORMATS[6:13], FORMATS[10:13]
+MESHES, PICTURES, CODES = FORMATS[:7], FORMATS[7:14], FORMATS[11:14]
 
 
-def put_beside(kind: str, folder: Path) -> None:
-    """Write what the files of a format name into their folder."""
-    for name, data in BESIDE.get(kind, {}).items():
-        (folder / name).write_bytes(data)
+def put_beside(path: Path) -> None:
+    """Write what a file names into its folder; beside materials, the mesh that has them."""
+    for name, data in BESIDE.get(path.suffix[1:], {}).items():
+        (path.parent / name).write_bytes(data.replace(b"scene.mtl", path.name.encode()))
 
 
 @functools.cache

@@ -124,6 +124,7 @@ PEERS: dict[str, dict[str, Callable[[Path], Summary | None]]] = {
     "exr": {"OpenEXR": _by_openexr},
     "pfm": {"NumPy": _by_pfm_lines},
     "npy": {"NumPy": _by_numpy},
+    "mtl": {},
     **{kind: {"Pillow": _by_pillow} for kind in CODES},
     "npz": {"NumPy": _by_numpy_zip},
 }

@@ -44,8 +44,15 @@ def without_compiling():
     return before
 
 
+def read_path(path: Path) -> Path:
+    """Give the path of the file that is read and named."""
+    return path.with_name("scene.obj") if path.suffix == ".mtl" else path
+
+
 def read(kind: str, path: Path):
-    """Read a file by the public function for its format."""
+    """Read a file by the public function for its format, materials by the mesh that has them."""
+    if kind == "mtl":
+        return geometry.read_mesh(read_path(path))
     if kind in MESHES:
         return geometry.read_mesh(path)
     if kind in PICTURES:
@@ -101,7 +108,7 @@ def check(kind: str, path: Path) -> Outcome:
 
 
 def _check_words(message: str, path: Path, most: int = 400) -> None:
-    rest = message.replace(str(path), "", 1)
+    rest = message.replace(str(read_path(path)), "", 1)
     if rest == message:
         raise Fault(f"does not name the file: {message}")
     if len(rest) > most or not rest.isprintable():

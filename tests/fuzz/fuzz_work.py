@@ -37,7 +37,7 @@ def work(kind, seed, indices, at, stage, spent, found, peers) -> None:
     memory = "/dev/shm"  # where files are in memory, on Linux
     with tempfile.TemporaryDirectory(dir=memory if os.path.isdir(memory) else None) as folder:
         path = Path(folder) / f"input.{kind}"
-        put_beside(kind, path.parent)
+        put_beside(path)
         path.write_bytes(seeds(kind)[0])
         check(kind, path)  # what is loaded or compiled once counts against no input
         began = time.process_time()

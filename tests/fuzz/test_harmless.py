@@ -178,8 +178,8 @@ CASES = [(*key, name) for key, changes in HARMLESS.items() for name in changes]
 
 @pytest.mark.parametrize(("kind", "which", "name"), CASES)
 def test_what_means_nothing_changes_nothing(tmp_path, kind, which, name):
-    put_beside(kind, tmp_path)
     path = tmp_path / f"a.{kind}"
+    put_beside(path)
     read = []
     for data in (seeds(kind)[which], HARMLESS[kind, which][name](seeds(kind)[which])):
         path.write_bytes(data)
