@@ -105,10 +105,13 @@ def _unpack(path: Path) -> dict[str, np.ndarray]:
     with zipfile.ZipFile(path) as archive:
         members = set(archive.namelist())
         stored = {name: f"{name}.npy" for name in names if f"{name}.npy" in members}
-        size = sum(archive.getinfo(file).file_size for file in stored.values())
-        most = 10 * path.stat().st_size + _ROOM
-        if size > most:
-            raise ValueError(f"it unpacks to {size} bytes, and {most} are plausible")
+        entries = [archive.getinfo(file) for file in stored.values()]
+        size, held = sum(entry.file_size for entry in entries), path.stat().st_size
+        # What the directory says is asked for from the memory before anything is read.
+        if any(entry.compress_size > held for entry in entries):
+            raise ValueError(f"its directory announces more than the {held} bytes that are there")
+        if size > 10 * held + _ROOM:
+            raise ValueError(f"it unpacks to {size} bytes out of {held}, which is not plausible")
         return {name: from_npy(archive.read(file)) for name, file in stored.items()}
 
 

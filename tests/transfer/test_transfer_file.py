@@ -121,7 +121,15 @@ def test_a_small_file_does_not_unpack_into_a_large_one(tmp_path):
     path = tmp_path / "a.npz"
     with path.open("wb") as file:
         np.savez_compressed(file, format="jaxsh transfer", coefficients=np.zeros((5_000_000, 4)))
-    with pytest.raises(ValueError, match=r"a\.npz: damaged: it unpacks to 160000\d+ bytes, and 6"):
+    with pytest.raises(ValueError, match=r"a\.npz: damaged: it unpacks to 160000\d+ bytes out of"):
+        load(path)
+
+
+def test_a_directory_that_announces_too_much_asks_for_no_memory(tmp_path, whole):
+    path = tmp_path / "a.npz"
+    entry = whole.index(b"PK\1\2")  # of the first file; its packed size is 20 bytes on
+    path.write_bytes(whole[: entry + 20] + b"\xf0\xff\xff\x7f" + whole[entry + 24 :])
+    with pytest.raises(ValueError, match=r"a\.npz: damaged: its directory announces more than"):
         load(path)
 
 
