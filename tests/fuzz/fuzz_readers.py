@@ -1,6 +1,5 @@
 """What a reader may do with any bytes: read them, or refuse them in one sentence."""
 
-import resource
 import time
 import warnings
 from pathlib import Path
@@ -16,7 +15,6 @@ from jaxsh.geometry import _assemble
 SECONDS = 2.0
 MEMORY = 200 << 20
 _ARRAYS = ("vertices", "faces", "normals", "uv", "colors", "face_material")
-_PAGE = resource.getpagesize()
 
 
 class Fault(AssertionError):
@@ -146,7 +144,12 @@ def _check_result(kind: str, result) -> None:
 
 
 def limit_memory(size: int) -> None:
-    """Let this process have ten times a file and 200 MB more than it has now."""
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
-    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-    resource.setrlimit(resource.RLIMIT_AS, (pages * _PAGE + 10 * size + MEMORY, hard))
+    """Let this process have ten times a file and 200 MB more than it has now, where Linux says."""
+    import resource
+
+    held = Path("/proc/self/statm")
+    if held.exists():
+        pages = int(held.read_text().split()[0])
+        most = pages * resource.getpagesize() + 10 * size + MEMORY
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        resource.setrlimit(resource.RLIMIT_AS, (most, hard))
