@@ -156,7 +156,7 @@ def _in_blocks(
 def _from_file(given: np.ndarray, slots: np.ndarray, whole: Clean) -> tuple[np.ndarray, list[str]]:
     """Take unit normals (f, 3, 3) from the file, smooth ones where it has none or bad ones."""
     unit = _in_blocks(_unit, given, slots)
-    good = np.all(np.isfinite(unit), axis=2)
+    good = np.asarray(np.isfinite(unit).all(axis=2))
     said = []
     if not good.all():
         missing = int(np.isnan(given[slots[~good]]).all(axis=1).sum())

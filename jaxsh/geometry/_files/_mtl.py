@@ -13,6 +13,7 @@ from ._text import plain_text
 # How many words follow each option of a map at least, and at most where they are numbers.
 _OPTIONS = {
     **dict.fromkeys(("-blendu", "-blendv", "-cc", "-clamp", "-imfchan", "-type"), (1, 1)),
+    "-colorspace": (1, 1),
     **dict.fromkeys(("-bm", "-boost", "-texres"), (1, 1)),
     "-mm": (2, 2),
     **dict.fromkeys(("-o", "-s", "-t"), (1, 3)),
@@ -30,7 +31,8 @@ class Materials:
         self._pictures: dict[Path | str, UInt8[np.ndarray, "h w 4"] | None] = {}
         # A line may name several files, and a name may hold blanks.
         for line in files:
-            for name in [line] if beside(path, line) else line.split():
+            names = [line] if beside(path, line) else re.split(r"(?<!\\)\s+", line)
+            for name in (one.replace("\\ ", " ") for one in names):
                 place = beside(path, name)
                 if place is None:
                     found.append(f"the materials {name!r} are not there")

@@ -14,7 +14,7 @@ from ._text import JOINT, Words, parse, plain_text, ranges, unit_colors
 _STATEMENTS = re.compile(
     "v|vt|vn|vp|deg|bmat|step|cstype|p|l|f|curv|curv2|surf|parm|trim|hole|scrv|sp|end|con|g|s|mg|o|"
     "bevel|c_interp|d_interp|lod|usemap|maplib|usemtl|mtllib|shadow_obj|trace_obj|ctech|stech|"
-    "bsp|bzp|cdc|cdp|res|call|csh|fo"
+    "bsp|bzp|cdc|cdp|res|call|csh|fo|t|vw"
 )
 # Statements that are left out, and said so.
 _OTHERS = {
@@ -25,6 +25,9 @@ _OTHERS = {
     "surf": "surfaces",
     "call": "calls of other files",
     "usemap": "texture maps without a material",
+    # Additions of other programs.
+    "t": "tags of subdivision",
+    "vw": "skin weights",
 }
 
 
@@ -91,6 +94,9 @@ def _vertices(words: Words, lines: np.ndarray, found: list[str]):
     positions = numbers[begin[:, None] + np.arange(3)]
     if more := int((~np.isin(counts, (3, 4, 6, 7))).sum()):
         found.append(f"further values of {more} vertices ignored")
+    weighted = counts == 4
+    if weighted.any() and (lost := int((words.numbers(first[weighted] + 3) != 1).sum())):
+        found.append(f"weights w of {lost} vertices ignored")
     colored = widths > 3
     if not colored.any():
         return positions, None
