@@ -7,6 +7,9 @@ import numpy as np
 # Faces whose corners are held in float64 at a time: all at once they take more than the file.
 _BLOCK = 1 << 16
 
+# Faces that are looked at together: their corners in float64 take memory.
+_BLOCK = 2**16
+
 
 class Clean(NamedTuple):
     """Holds what is left of raw vertices and faces, joined where positions are equal."""
@@ -145,12 +148,12 @@ def _repeats(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _has_area(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Tell whether a face is higher, over its longest edge, than float32 can tell from zero."""
-    has_area = np.empty(len(faces), bool)
+    has = np.empty(len(faces), bool)
     for start in range(0, len(faces), _BLOCK):
         block = slice(start, start + _BLOCK)
         corners = vertices[faces[block]].astype(np.float64)
         edges = np.roll(corners, -1, axis=1) - corners
         longest_squared = (edges**2).sum(axis=2).max(axis=1)
         twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-        has_area[block] = twice_area > np.finfo(np.float32).eps * longest_squared
-    return has_area
+        has[block] = twice_area > np.finfo(np.float32).eps * longest_squared
+    return has

@@ -124,7 +124,8 @@ def test_obj_materials_and_pictures_are_those_beside_the_file(tmp_path):
     )
     text = (
         "mtllib none.mtl all\\ of\\ them.mtl\n"
-        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nusemtl wall\nf 1 3 4\nusemtl red paint # twice\nf 1 2 4\nusemtl lost\nf 2 3 4\n"
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n"
+        "usemtl wall\nf 1 3 4\nusemtl red paint # twice\nf 1 2 4\nusemtl lost\nf 2 3 4\n"
         "usemtl nowhere\nf 1 2 5\nusemtl wall\nf 1 3 5\n"
         "s 1\ns off\nl 1 2\np 1\nt crease 2/1/0 1 2 4.7\nv 0 0 0 2\nv 0 0 0 1.0\n"
     )
