@@ -128,14 +128,13 @@ def _first(keys: np.ndarray) -> np.ndarray:
 
 def _repeats(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tell which faces repeat an earlier one the same way round, and which run the other way."""
-    ends = np.sort(faces, axis=1).astype(np.uint64)
+    low, middle, high = np.sort(faces, axis=1).astype(np.uint32).T
     count = np.uint64(int(faces.max(initial=0)) + 1)
     # Three indices as one number, or two where three do not fit.
-    pair = ends[:, 0] * count + ends[:, 1]
-    if int(count) ** 3 < 2**64:
-        first = _first(pair * count + ends[:, 2])
-    else:
-        first = _first(_first(pair).astype(np.uint64) * count + ends[:, 2])
+    key = low * count + middle
+    if int(count) ** 3 >= 2**64:
+        key = _first(key).astype(np.uint64)
+    first = _first(key * count + high)
     # Even permutations of the sorted corners run one way, odd ones the other.
     a, b, c = faces.T
     odd = (a > b) ^ (b > c) ^ (a > c)
