@@ -10,104 +10,135 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from .._core.xla import materialize, on_mesh, varying_as
 from ..harmonics import degrees, evaluate
 from ..harmonics._tables import gradient_table
-from ._vectors import cross, dot, inverse_length, reciprocal, scale
+from ._vectors import (
+    close_cross,
+    cross,
+    cross_high,
+    difference,
+    dot,
+    inverse_length,
+    reciprocal,
+    scale,
+    select,
+)
 
 _Y0 = float(np.sqrt(1 / (4 * np.pi)))
 
 Rows = Float[Array, "*arcs 3 n"]
+Vectors = Float[Array, "*_ 3 _"]  # of any shapes that broadcast
 
 
 class Arcs(NamedTuple):
     """The boundary of a region as n receivers see it, arc by arc, in any order.
 
-    From `start` to `end`, vectors of any length, in the plane square to the unit vector `normal`,
-    which points out of the region: the arcs go counter-clockwise around it, seen from the
-    sphere's center, and clockwise around what is taken away from it. 1/r = near·ω for the light's
-    or blocker's edge that lies behind ω; `near` is zero where the boundary is at rest on the
-    sphere, not in space.
+    From `start` to `end`, vectors of any length, counter-clockwise around the unit vector
+    `normal`. That points out of the region; around what is taken away from it the arcs run the
+    other way, and it points in. 1/r = line·ω for the line in space on which both ends lie, and
+    `near` is `line` where that is an edge of the light or of a blocker, and zero where the
+    boundary is at rest on the sphere.
     """
 
     start: Rows
     end: Rows
     normal: Rows
+    line: Rows
     near: Rows
 
 
-def edge_arcs(start: Rows, end: Rows) -> Arcs:
-    """The arcs of edges: normal s×e/|s×e|, and near = f/|f|² with f the foot on the edge's line.
+def edge_arcs(first: Vectors, second: Vectors, point: Vectors) -> Arcs:
+    """The arcs of edges between corners: normal s×e/|s×e|, line f/|f|² with f the line's foot.
 
-    Both are zero for an edge that points at the receiver or has no length.
+    Both are zero for an edge that points at the receiver or has no length. In float32 they are
+    right to rounding down to |f| = 1e-4 of the distance of the corners: what the differences
+    leave counts, since s and e are almost parallel there.
     """
+    (start, rest), (end, _), (along, left) = (
+        difference(a, b) for a, b in ((first, point), (second, point), (second, first))
+    )
+    if start.dtype == jnp.float32:
+        high, low = cross_high(start, along)
+        area = high + (low + cross(rest, along) + cross(start, left))
+    else:
+        area = cross(start, along)
+    normal, line = _line(along, area)
+    return Arcs(start, end, normal, line, line)
+
+
+def resting_arcs(start: Rows, end: Rows, normal: Rows) -> Arcs:
+    """Arcs at rest on the sphere, in the plane of a normal."""
     along = end - start
-    area = cross(start, along)  # not start×end: far away these are almost parallel
+    _, line = _line(along, close_cross(start, along))
+    return Arcs(start, end, normal, line, jnp.zeros_like(line))
+
+
+def _line(along: Vectors, area: Vectors) -> tuple[Vectors, Vectors]:
+    """Of a line: area/|area| and along × area/|area|²."""
     inverse = inverse_length(area)
-    # along × area, divided by |area|².
-    squared = inverse * inverse
-    near = scale(squared * dot(along, along), start) - scale(squared * dot(along, start), along)
-    return Arcs(start, end, scale(inverse, area), near)
+    normal = scale(inverse, area)
+    return normal, scale(inverse, cross(along, normal))
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(3,))
 def coefficients(
-    start: Float[Array, "arcs 3 n"],
-    end: Float[Array, "arcs 3 n"],
-    normal: Float[Array, "arcs 3 n"],
-    degree: int,
+    arcs: Arcs, apex: Float[Array, "3 n"], active: Bool[Array, " arcs"] | None, degree: int
 ) -> Float[Array, "k n"]:
     """∫ y_k dω over the region within closed loops of arcs, eqs. (1) and (2).
+
+    `apex` is a direction no further than π/2 from all of the region. Arcs that are not `active`
+    have no length for any receiver.
 
     The derivative is eq. (5): the arcs' ends carry their points, whose speed across the arc is
     all that counts.
     """
 
     def add_arc(total, arc):
-        flux, turn = total
+        flux, angle = total
         span, normal, triangle = arc
         if degree:
             nodes, weights = materialize(functools.partial(_nodes, degree), span)
             integral = materialize(_integrate_even, _basis(nodes, degree - 1), weights)
             flux = flux + normal[:, None] * integral[None]
-        return (flux, _product(turn, triangle)), None
+        return flux, angle + _angle(triangle)
 
-    nothing, no_turn = _nothing(start, degree**2, 3)
-    spans, triangles = _spans(start, end, normal)
-    (flux, turn), _ = jax.lax.scan(add_arc, (nothing, no_turn), (spans, normal, triangles))
-    return _from_flux(flux, _argument(turn), degree)
+    spans, triangles = _spans(arcs, apex)
+    nothing = _nothing(arcs.start, 3, degree**2), _nothing(arcs.start)
+    flux, angle = _sum(add_arc, nothing, (spans, arcs.normal, triangles), active)
+    return _from_flux(flux, angle, degree)
 
 
 @coefficients.defjvp
 def _coefficients_jvp(degree, primals, tangents):
-    start, end, normal = primals
-    start_moves, end_moves, _ = tangents  # the normal's follows from those of the ends
-    value = coefficients(start, end, normal, degree)
-    return value, _rate(start, end, normal, start_moves, end_moves, degree)
+    arcs, apex, active = primals
+    moves, _, _ = tangents  # the normal's follows from those of the ends, and no apex counts
+    return coefficients(arcs, apex, active, degree), _rate(arcs, moves, active, degree)
 
 
-def _rate(start: Rows, end: Rows, normal: Rows, start_moves: Rows, end_moves: Rows, degree: int):
+def _rate(arcs: Arcs, moves: Arcs, active: Array | None, degree: int):
     """Σ ∫ y_k v dt, eq. (5). The speed v across an arc is linear in ω, as 1/r and λ/r are."""
-    along, near = end - start, edge_arcs(start, end).near
+    start, end, normal, line, _ = arcs
+    along = end - start
     # λ/r for the point start + λ (end - start): 0 at the start, 1/r at the end.
-    end_share = scale(reciprocal(dot(along, along)), along - scale(dot(start, along), near))
-    speed = scale(dot(normal, start_moves), near - end_share)
-    speed = speed + scale(dot(normal, end_moves), end_share)
+    end_share = scale(reciprocal(dot(along, along)), along - scale(dot(start, along), line))
+    speed = scale(dot(normal, moves.start), line - end_share)
+    speed = speed + scale(dot(normal, moves.end), end_share)
 
     @jax.checkpoint  # in reverse, evaluate an arc's basis again rather than hold those of all
     def add_arc(total, arc):
         span, speed = arc
         nodes, weights = materialize(functools.partial(_nodes, degree + 2), span)
-        return total + _integrate_odd(_basis(nodes, degree), _times(weights, nodes, speed)), None
+        return total + _integrate_odd(_basis(nodes, degree), _times(weights, nodes, speed))
 
-    nothing, _ = _nothing(start, (degree + 1) ** 2)
-    return jax.lax.scan(add_arc, nothing, (_spans(start, end, normal)[0], speed))[0]
+    nothing = _nothing(start, (degree + 1) ** 2)
+    return _sum(add_arc, nothing, (_spans(arcs)[0], speed), active)
 
 
 def coefficients_with_gradient(
-    arcs: Arcs, degree: int
+    arcs: Arcs, apex: Float[Array, "3 n"], active: Bool[Array, " arcs"] | None, degree: int
 ) -> tuple[Float[Array, "k n"], Float[Array, "3 k n"]]:
     """∫ y_k dω, and its gradient by the receiver's position, eq. (4), at the same nodes."""
     lower = degree**2
@@ -115,44 +146,52 @@ def coefficients_with_gradient(
 
     @jax.checkpoint
     def add_arc(total, arc):
-        flux, pull, turn = total
+        flux, pull, angle = total
         span, normal, near, triangle = arc
         nodes, weights, slopes = materialize(sloped_nodes, span, near)
         change, *integrals = materialize(_integrate_both, _basis(nodes, degree), weights, slopes)
         if degree:
             flux = flux + normal[:, None] * integrals[0][None]
-        return (flux, pull + normal[:, None] * change[None], _product(turn, triangle)), None
+        return flux, pull + normal[:, None] * change[None], angle + _angle(triangle)
 
-    start, end, normal, near = arcs
-    no_flux, no_turn = _nothing(start, lower, 3)
-    no_pull, _ = _nothing(start, (degree + 1) ** 2, 3)
-    spans, triangles = _spans(start, end, normal)
-    each = spans, normal, near, triangles
-    (flux, pull, turn), _ = jax.lax.scan(add_arc, (no_flux, no_pull, no_turn), each)
-    return _from_flux(flux, _argument(turn), degree), -pull
+    shapes = (3, lower), (3, (degree + 1) ** 2), ()
+    nothing = tuple(_nothing(arcs.start, *shape) for shape in shapes)
+    spans, triangles = _spans(arcs, apex)
+    each = spans, arcs.normal, arcs.near, triangles
+    flux, pull, angle = _sum(add_arc, nothing, each, active)
+    return _from_flux(flux, angle, degree), -pull
+
+
+def _sum(add_arc, total, arcs, active: Bool[Array, " arcs"] | None):
+    """Add up arcs, one at a time. On the CPU those that no receiver has are left out."""
+
+    def add(total, arc):
+        arc, used = arc
+        if used is None or on_mesh(arc):
+            return add_arc(total, arc), None
+
+        def if_used(total, arc, used):
+            return jax.lax.cond(used, add_arc, lambda total, _: total, total, arc)
+
+        def anyhow(total, arc, _):
+            return add_arc(total, arc)
+
+        return jax.lax.platform_dependent(total, arc, used, cpu=if_used, default=anyhow), None
+
+    return jax.lax.scan(add, total, (arcs, active))[0]
 
 
 Complex = tuple[Array, Array]
 
 
-def _nothing(start: Rows, rows: int, *axes: int) -> tuple[Array, Complex]:
-    """Zeros (*axes, rows, n), and the number 1."""
-    n = start.shape[-1]
-    zero, one = jnp.zeros((*axes, rows, n), start.dtype), jnp.ones(n, start.dtype)
-    return varying_as((zero, (one, jnp.zeros_like(one))), start)
+def _nothing(start: Rows, *shape: int) -> Array:
+    """Zeros (*shape, n)."""
+    return varying_as(jnp.zeros((*shape, start.shape[-1]), start.dtype), start)
 
 
-def _product(a: Complex, b: Complex) -> Complex:
-    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
-
-
-def _argument(turn: Complex) -> Float[Array, " n"]:
-    """The solid angle, eq. (2): twice the argument of the product over all arcs.
-
-    Multiplied first, no branch is lost while the whole is in (-2π, 2π), whatever single triangles
-    are.
-    """
-    x, y = turn
+def _angle(triangle: Complex) -> Float[Array, " n"]:
+    """The solid angle of an arc's triangle, in [-π, π] as no corner is beyond π/2 of the apex."""
+    x, y = triangle  # both zero for a receiver on the edge
     return 2 * jnp.arctan2(y, jnp.where((x == 0) & (y == 0), 1, x))
 
 
@@ -165,24 +204,34 @@ class _Spans(NamedTuple):
     cosine: Float[Array, "*arcs n"]
 
 
-def _spans(start: Rows, end: Rows, normal: Rows) -> tuple[_Spans, Complex]:
-    """Arcs by their middles, and the complex numbers of eq. (2).
+def _spans(arcs: Arcs, apex: Float[Array, "3 n"] | None = None) -> tuple[_Spans, Complex]:
+    """Arcs by their middles, and the complex numbers of eq. (2) of their triangles (apex, a, b).
 
-    Those belong to the arcs' triangles, which have one apex, the first start.
+    The middle is along a + b for arcs below π/2; above, b - a along the tangent has the digits.
     """
+    start, end, normal = arcs.start, arcs.end, arcs.normal
     inverse_start, inverse_end = inverse_length(start), inverse_length(end)
-    a = scale(inverse_start, start)
-    both = a + scale(inverse_end, end)
-    inverse = inverse_length(both)
-    squared = dot(both, both)  # 2 + 2 cos θ
-    middle = scale(inverse, both)
+    a, b = scale(inverse_start, start), scale(inverse_end, end)
+    both, chord = a + b, b - a
+    closed, opened = dot(both, both), dot(chord, chord)  # 2 ± 2 cos θ
+    wide = opened > closed
+    inverse = inverse_length(select(wide, chord, both))
+    larger = jnp.where(wide, opened, closed) * inverse / 2
+    nearer = select(inverse_start > inverse_end, start, end)
+    area = dot(normal, cross(nearer, end - start)) * (inverse_start * inverse_end)
+    smaller = jnp.abs(area) * inverse  # sin θ/2, of the other, divided by the larger
+    axis = scale(inverse, select(wide, chord, both))
+    aside = cross(normal, axis)
+    turned = wide & (dot(normal, normal) > 0)  # no normal: a receiver on the edge
+    middle, tangent = select(turned, -aside, axis), select(turned, axis, aside)
+    sine = jnp.where(wide, larger, smaller)
     # Zero for an arc of no length: a receiver on the edge.
-    cosine = jnp.where(inverse == 0, 1, squared * inverse / 2)
-    area = cross(start, end - start)
-    sine = dot(normal, area) * (inverse_start * inverse_end) * inverse
-    apex = a[:1]
-    triangles = squared / 2 + dot(apex, both), -dot(apex, area) * inverse_start * inverse_end
-    return _Spans(middle, cross(normal, middle), sine, cosine), triangles
+    cosine = jnp.where(inverse == 0, 1, jnp.where(wide, smaller, larger))
+    spans = _Spans(middle, tangent, sine, cosine)
+    if apex is None:
+        return spans, (cosine, sine)
+    apex = apex[None]
+    return spans, (dot(apex, middle) + cosine, -dot(apex, normal) * sine)
 
 
 def _nodes(count: int, span: _Spans) -> tuple[Float[Array, "3 count n"], Complex]:

@@ -20,13 +20,15 @@ from .._core.checks import (
     is_concrete,
 )
 from .._core.xla import in_blocks
-from ._emitters import Polygon, is_convex
+from ._emitters import Polygon, area_vector, is_convex
 from ._visible import Plan, Scene, seen
 
 # Receivers per block: the basis of an arc's nodes stays in cache.
 _BLOCK = 1024
 # And per call of an accelerator, as far as its memory goes.
 _MOST = 262_144
+# With more arcs than twice as many there are fewer receivers to a block, in proportion.
+_ARCS = 128
 
 
 def polygon_harmonics(
@@ -123,18 +125,51 @@ def _light(polygon, point, degree, horizon, blockers, gradient: bool):
     clipped = horizon is not None or len(blockers) > 0
     convex = is_concrete(polygon.vertices) and is_convex(np.asarray(polygon.vertices))
     dtype = point.dtype
-    scene = Scene(
-        polygon.vertices.astype(dtype),
-        tuple(blocker.vertices.astype(dtype) for blocker in blockers),
-    )
+    scene = Scene(polygon.vertices.astype(dtype), _plane(polygon, dtype), _corners(blockers, dtype))
     plan = Plan(
         check_degree(degree),
         gradient,
         polygon.two_sided,
         horizon=horizon is not None,
         triangles=clipped and not convex,
+        in_front=not polygon.two_sided and _all_in_front(polygon, blockers),
     )
     return _compiled(scene, point, normals.astype(dtype), polygon.radiance.astype(dtype), plan)
+
+
+def _plane(polygon: Polygon, dtype) -> Float[Array, "2 3"]:
+    """The unit normal, rounded, and the rest of it: which side a point near the plane is on."""
+    if is_concrete(polygon.vertices):
+        area = area_vector(np.asarray(polygon.vertices).astype(dtype).astype(np.float64))
+        normal = area / np.linalg.norm(area)
+        rounded = normal.astype(dtype)
+        return jnp.asarray(np.stack([rounded, (normal - rounded).astype(dtype)]))
+    spokes = jax.lax.stop_gradient(polygon.vertices - polygon.vertices[:1]).astype(dtype)
+    area = jnp.cross(spokes, jnp.roll(spokes, -1, axis=0)).sum(axis=0)
+    size = jnp.linalg.norm(area)
+    normal = area / jnp.where(size > 0, size, 1)
+    return jnp.stack([normal, jnp.zeros_like(normal)])
+
+
+def _corners(blockers: Sequence[Polygon], dtype) -> Float[Array, "b m 3"]:
+    """The corners of all, as many for each: the last is repeated."""
+    most = max((len(blocker.vertices) for blocker in blockers), default=0)
+    rows = []
+    for blocker in blockers:
+        corners = blocker.vertices.astype(dtype)
+        last = jnp.broadcast_to(corners[-1:], (most - len(corners), 3))
+        rows.append(jnp.concatenate([corners, last]))
+    return jnp.stack(rows) if rows else jnp.zeros((0, 0, 3), dtype)
+
+
+def _all_in_front(polygon: Polygon, blockers: Sequence[Polygon]) -> bool:
+    """Whether values are known, and all of the blockers is on the light's side of its plane."""
+    if not all(is_concrete(shape.vertices) for shape in (polygon, *blockers)):
+        return False
+    vertices = np.asarray(polygon.vertices, np.float64)
+    normal = area_vector(vertices)
+    sides = [(np.asarray(b.vertices, np.float64) - vertices[0]) @ normal for b in blockers]
+    return all((side >= 0).all() and (side > 0).any() for side in sides)
 
 
 @functools.partial(jax.jit, static_argnums=4)
@@ -162,4 +197,11 @@ def _unit_lights(scene: Scene, points, normals, plan: Plan):
         lights = seen(scene, points.T, normals.T, plan)
         return tuple(jnp.moveaxis(light, (-1, -2), (0, 1)) for light in lights)
 
-    return in_blocks(block, points, normals, size=_BLOCK, most=_MOST)
+    corners, (count, most) = len(scene.vertices), scene.blockers.shape[:2]
+    loops, length = (corners - 2, 3) if plan.triangles else (1, corners)
+    arcs = loops * (length + plan.horizon) * (count + 1)
+    arcs += loops * count * (most + (not plan.in_front)) * (count + 1 if count > 1 else 1)
+    fewer = max(1, arcs // _ARCS)
+    return in_blocks(
+        block, points, normals, size=max(1, _BLOCK // fewer), most=max(1, _MOST // fewer)
+    )

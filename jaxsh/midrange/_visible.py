@@ -1,22 +1,28 @@
 """A polygon as receivers see it: above the horizon, beside what stands before it."""
 
+import math
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
-from .._core.xla import materialize
 from ._arcs import Arcs, Rows, coefficients, coefficients_with_gradient, edge_arcs
-from ._vectors import dot, reciprocal, scale, select, unit
+from ._clip import clip_horizon, cut, edges_of, left_over, within
+from ._vectors import close_dot, cross, difference, dot, scale, select, unit
 
 
 class Scene(NamedTuple):
-    """Corners of the light and of convex blockers. The horizon, if any, comes with the points."""
+    """Corners of the light and of convex blockers, the last repeated where they have fewer.
+
+    `plane` is the light's unit normal, rounded, and what the rounding leaves. The horizon, if
+    any, comes with the points.
+    """
 
     vertices: Float[Array, "n 3"]
-    blockers: tuple[Float[Array, "m 3"], ...]
+    plane: Float[Array, "2 3"]
+    blockers: Float[Array, "b m 3"]
 
 
 class Plan(NamedTuple):
@@ -27,14 +33,7 @@ class Plan(NamedTuple):
     two_sided: bool
     horizon: bool
     triangles: bool
-
-
-class _Cone(NamedTuple):
-    """The part of a blocker before the light: its arcs, their sense, and whether it blocks."""
-
-    arcs: Arcs
-    turn: Float[Array, " n"]
-    blocks: Array
+    in_front: bool  # whether all of all blockers is in front of the light's plane
 
 
 def seen(
@@ -45,144 +44,150 @@ def seen(
     if plan.triangles:
         i = corners[0, 1:-1]
         corners = np.stack([np.zeros_like(i), i, i + 1], axis=1)
+    height = _height(scene, point)
+    ahead = jnp.sign(height)  # 1 for points behind: the plane's normal points away from them
+    apex = scale(ahead, scene.plane[0][:, None])
     loops = _outline(scene.vertices[corners], point)
+    turns = jnp.sign(dot(_area(scene.vertices[corners]), scene.plane[:1, :, None]))
+    orient = -turns * ahead[None]
     if plan.horizon:
-        loops = clip_horizon(loops, unit(horizon))
-    normal = _normal(scene.vertices)
-    height = _height(normal, scene.vertices, point)
-    arcs = _visible(loops, [_cone(blocker, point, normal, height) for blocker in scene.blockers])
-    if plan.gradient:
-        lights = list(coefficients_with_gradient(arcs, plan.degree))
-    else:
-        lights = [coefficients(arcs.start, arcs.end, arcs.normal, plan.degree)]
+        loops = clip_horizon(loops, unit(horizon), orient)
+    arcs, active = _flat(loops), None
+    if len(scene.blockers):
+        arcs, active = _beside_blockers(scene, loops, orient, ahead, point, plan)
+    integrate = coefficients_with_gradient if plan.gradient else coefficients
+    lights = integrate(arcs, apex, active, plan.degree)
     # What is seen from behind comes out negative.
     behind = -1 if plan.two_sided else 0
-    side = jnp.where(height < 0, 1, jnp.where(height > 0, behind, 0)).astype(point.dtype)
+    side = jnp.where(ahead < 0, 1, jnp.where(ahead > 0, behind, 0)).astype(point.dtype)
+    lights = lights if plan.gradient else [lights]
     sides = (side.reshape((1,) * (light.ndim - 1) + side.shape) for light in lights)
     return [jnp.where(s != 0, s * light, 0) for s, light in zip(sides, lights, strict=True)]
 
 
-def _visible(loops: Arcs, cones: list[_Cone]) -> Arcs:
-    """All arcs of the light outside of the cones.
+def _beside_blockers(
+    scene: Scene,
+    loops: Arcs,
+    orient: Float[Array, "loops n"],
+    ahead: Float[Array, " n"],
+    point: Float[Array, "3 n"],
+    plan: Plan,
+) -> tuple[Arcs, Bool[Array, " arcs"]]:
+    """All arcs of the light outside of the blockers' cones, and which of them anybody has.
 
-    Cone by cone: the part of the loops within it is added once more, the other way around. All
-    harmonics' integrals, and solid angles, are sums over arcs, and so have it taken away.
+    Parts of the light's edges outside of all cones, and the other way around parts of the
+    blockers' edges within the light and outside of all other cones: the boundary of what the
+    union of the blockers leaves. Where two edges lie in one plane with the receiver, both bound
+    nothing if what is seen is on neither side of it, and otherwise that of the light or of the
+    first blocker does.
     """
-    parts = [loops]
-    for cone in cones:
-        most = max(part.start.shape[1] for part in parts)
-        filled = [with_room(part, most - part.start.shape[1]) for part in parts]
-        together = jax.tree.map(lambda *rows: jnp.concatenate(rows), *filled)
-        hidden = clip_cone(together, cone.arcs, cone.turn)
-        end = select(cone.blocks[None, None], hidden.start, hidden.end)
-        parts.append(Arcs(hidden.end, end, hidden.normal, hidden.near))
-    return jax.tree.map(lambda *rows: jnp.concatenate([_flat(row) for row in rows]), *parts)
+    count = len(scene.blockers)
+    edges, blocks, turn = _blockers(scene, ahead, point, plan)  # (b, m, 3, n) and (b, n)
+    outward = scale(turn[:, None], edges.normal)
+    cones = jnp.moveaxis(outward, 1, 0)  # one plane after the other
+
+    def hidden(part, own=None):
+        """The intervals of those that block, with their axis first."""
+        low, high = part
+        there = blocks if own is None else blocks[None, None] & own
+        low = jnp.where(there, low, 1)
+        return jnp.moveaxis(low, -2, 0), jnp.moveaxis(jnp.where(there, high, 0), -2, 0)
+
+    zero = jnp.zeros_like(loops.start[..., 0, :])
+    walls = scale(orient[:, None], loops.normal)
+    shadow = within(edges_of(loops._replace(normal=walls), 2), cones[:, None, None], True, False)
+    lit = left_over((zero, zero + 1), hidden(shadow))
+    # Of each edge of a blocker the part within each convex loop of the light, (b, m, loops, n).
+    walls = jnp.moveaxis(walls, 1, 0)[:, None, None]
+    outwards = edges_of(edges._replace(normal=outward), 2)
+    low, high = within(outwards, walls, False, False)
+    high = jnp.where(blocks[:, None, None], high, -1)
+    base = low, jnp.maximum(low, high)
+    if count > 1:
+        number = np.arange(count)
+        later = jnp.asarray(number[:, None] > number[None])[:, None, :, None]
+        other = jnp.asarray(number[:, None] != number[None])[:, None, :, None]
+        part = hidden(within(outwards, cones[:, None, None], later, True), other)
+        base = left_over(base, tuple(x[:, :, :, None] for x in part))
+    else:
+        base = tuple(x[None] for x in base)
+    flip = (orient[None] * turn[:, None] > 0)[None, :, None]
+    edges = jax.tree.map(lambda row: row[None, :, :, None], edges)
+    parts = [
+        _parts(jax.tree.map(lambda row: row[None], loops), lit, None),
+        _parts(edges, base, flip),
+    ]
+    active = [_flat_rows(high > low, 1).any(axis=-1) for low, high in (lit, base)]
+    return jax.tree.map(lambda *rows: jnp.concatenate(rows), *parts), jnp.concatenate(active)
 
 
-def _flat(row: Float[Array, "loops arcs 3 n"]) -> Float[Array, "all 3 n"]:
-    return row.reshape(row.shape[0] * row.shape[1], *row.shape[2:])
+def _parts(arcs: Arcs, share: tuple[Array, Array], flip: Bool[Array, "..."] | None) -> Arcs:
+    """From share to share of arcs, all in one axis; turned around in space where `flip`."""
+    first, last = (scale(1 - t, arcs.start) + scale(t, arcs.end) for t in share)
+    normal = jnp.broadcast_to(arcs.normal, first.shape)
+    if flip is not None:
+        first, last = select(flip, last, first), select(flip, first, last)
+        normal = scale(jnp.where(flip, -1, 1).astype(normal.dtype), normal)
+    line, near = (jnp.broadcast_to(row, first.shape) for row in (arcs.line, arcs.near))
+    return _flat(Arcs(first, last, normal, line, near))
+
+
+def _flat(arcs: Arcs) -> Arcs:
+    return jax.tree.map(lambda row: _flat_rows(row, 2), arcs)
+
+
+def _flat_rows(row: Array, kept: int) -> Array:
+    """All axes but the last few as one; there may be no receivers."""
+    return row.reshape(math.prod(row.shape[:-kept]), *row.shape[-kept:])
 
 
 def _outline(corners: Float[Array, "loops m 3"], point: Float[Array, "3 n"]) -> Arcs:
-    start = corners[..., None] - point[None, None]
-    return edge_arcs(start, jnp.roll(start, -1, axis=1))
+    first = corners[..., None]
+    return edge_arcs(first, jnp.roll(first, -1, axis=1), point[None, None])
 
 
-def _normal(vertices: Float[Array, "n 3"]) -> Float[Array, " 3"]:
-    """Normal of the length of twice the area, by Newell's formula."""
-    spokes = vertices - vertices[:1]
-    return jnp.cross(spokes, jnp.roll(spokes, -1, axis=0)).sum(axis=0)
+def _area(corners: Float[Array, "loops m 3"]) -> Float[Array, "loops 3 1"]:
+    """Normals of the length of twice the area, by Newell's formula."""
+    spokes = (corners - corners[:, :1])[..., None]
+    return jnp.sum(cross(spokes, jnp.roll(spokes, -1, axis=1)), axis=1)
 
 
-def _height(normal: Float[Array, " 3"], vertices: Array, point: Float[Array, "3 n"]) -> Array:
-    """normal · (vertex - point): below zero for points in front."""
-    return dot(normal[:, None], vertices[0][:, None] - point)
+def _height(scene: Scene, point: Float[Array, "3 n"]) -> Float[Array, " n"]:
+    """normal · (vertex - point): below zero for points in front. Only its sign is wanted."""
+    way, rest = difference(scene.vertices[0][:, None], point)
+    normal, left = (row[:, None] for row in scene.plane)
+    return jax.lax.stop_gradient(close_dot(normal, way) + (dot(left, way) + dot(normal, rest)))
 
 
-def _cone(vertices: Array, point: Array, normal: Array, height: Array) -> _Cone:
-    """`normal` and `height` are those of the light's plane, behind which nothing blocks."""
-    arcs = _outline(vertices[None], point)
-    facing = -jnp.sign(height)[None, None]
+def _blockers(
+    scene: Scene, ahead: Float[Array, " n"], point: Float[Array, "3 n"], plan: Plan
+) -> tuple[Arcs, Bool[Array, "b n"], Float[Array, "b n"]]:
+    """Their edges, whether they block, and 1 where they are seen counter-clockwise, else -1.
 
-    def before(rows: Rows) -> Array:
-        return (dot(normal[None, None, :, None], rows) - height[None, None]) * facing
-
-    sides = before(arcs.start), before(arcs.end)
-    own = _height(_normal(vertices), vertices, point)
-    blocks = (own != 0) & jnp.any(sides[0] > 0, axis=(0, 1))
-    part = jax.tree.map(_flat, joined(*clip(arcs, *sides)))
-    return _Cone(part, -jnp.sign(own), blocks)
-
-
-def clip(loops: Arcs, start_side: Array, end_side: Array, plane: tuple[Rows, Rows] | None = None):
-    """The part of convex loops (loops, arcs, 3, receivers) where `side` >= 0, a linear function.
-
-    Sutherland and Hodgman's clip with arcs in any order, so that it is all the same operations
-    for all receivers: the arcs keep their parts, the first result, and one more closes each loop,
-    from where it goes out to where it comes in, the second. That has the normal and `near` of
-    `plane`, or those of the edge that it is, at rest in space. What is cut away leaves arcs of no
-    length.
+    Only the part on the receiver's side of the light's plane blocks.
     """
-    start_in, end_in = start_side >= 0, end_side >= 0
-    leaves, enters = start_in & ~end_in, ~start_in & end_in
-    share = start_side * reciprocal(start_side - end_side)
-    crossing = loops.start + scale(share, loops.end - loops.start)
-    start = select(enters, crossing, loops.start)
-    end = select(leaves, crossing, select(end_in, loops.end, loops.start))
+    first = scene.blockers[..., None]  # (b, m, 3, 1)
+    second = jnp.roll(first, -1, axis=1)
+    own = dot(_area(scene.blockers), first[:, 0] - point[None])
+    blocks = own != 0
+    if not plan.in_front:
+        normal = scene.plane[None, None, 0, :, None]
+        side = dot(normal, first - scene.vertices[0].reshape(1, 1, 3, 1))
+        sides = side, jnp.roll(side, -1, axis=1)
 
-    def only(mask: Array) -> Rows:
-        """The crossing in the mask; the mean where rounding finds two at one corner."""
-        count = jnp.sum(mask, axis=1, keepdims=True).astype(share.dtype)
-        total = jnp.sum(select(mask, crossing, jnp.zeros_like(crossing)), axis=1, keepdims=True)
-        return scale(reciprocal(count), total)
+        def before(facing):
+            start, end, out, back = cut(first, second, *(facing * side for side in sides))
+            there = jnp.any(facing * side > 0, axis=1)
+            starts, ends = (jnp.concatenate(x, axis=1) for x in ((start, out), (end, back)))
+            return starts, ends, there
 
-    closed = jnp.any(leaves, axis=1, keepdims=True) & jnp.any(enters, axis=1, keepdims=True)
-    out = select(closed, only(leaves), loops.start[:, :1])
-    back = select(closed, only(enters), out)
-    kept = Arcs(start, end, loops.normal, loops.near)
-    if plane is None:
-        return kept, edge_arcs(out, back)
-    return kept, Arcs(out, back, *(jnp.broadcast_to(rows, out.shape) for rows in plane))
-
-
-def joined(*loops: Arcs) -> Arcs:
-    """All arcs of all."""
-    return Arcs(*(jnp.concatenate(rows, axis=1) for rows in zip(*loops, strict=True)))
-
-
-def with_room(loops: Arcs, count: int) -> Arcs:
-    """So many arcs of no length more."""
-    shape = len(loops.end), count, *loops.end.shape[2:]
-    end, normal, near = (
-        jnp.broadcast_to(rows[:, -1:], shape) for rows in (loops.end, loops.normal, loops.near)
-    )
-    return joined(loops, Arcs(end, end, normal, near))
-
-
-def clip_horizon(loops: Arcs, normal: Rows) -> Arcs:
-    """The part above the plane through the receiver with this unit normal, (3, receivers)."""
-    normal = normal[None, None]
-    plane = -normal, jnp.zeros_like(normal)
-    return joined(
-        *materialize(clip, loops, dot(normal, loops.start), dot(normal, loops.end), plane)
-    )
-
-
-def clip_cone(loops: Arcs, cone: Arcs, turn: Array) -> Arcs:
-    """The part within a convex cone, given by its arcs (arcs, 3, receivers).
-
-    `turn` (receivers,) is 1 where they go counter-clockwise around it, and -1 where clockwise.
-    """
-    present, new = loops.start.shape[1], len(cone.start)
-
-    def cut(loops, plane):
-        i, outward, near = plane
-        sides = -dot(outward, loops.start), -dot(outward, loops.end)
-        kept, closing = materialize(clip, loops, *sides, (outward, near))
-        put = jax.lax.dynamic_update_slice_in_dim
-        return jax.tree.map(lambda a, b: put(a, b, present + i, axis=1), kept, closing), None
-
-    outward = scale(turn[None], cone.normal)
-    planes = jnp.arange(new, dtype=jnp.int32), outward[:, None, None], cone.near[:, None, None]
-    # Space for one more arc of each plane: a loop whose body is compiled once.
-    return jax.lax.scan(cut, with_room(loops, new), planes)[0]
+        first, second, there = before(1)
+        if plan.two_sided:
+            others = before(-1)
+            front = ahead < 0
+            first, second = (
+                jnp.where(front, a, b) for a, b in zip((first, second), others[:2], strict=True)
+            )
+            there = jnp.where(front, there, others[2])
+        blocks = blocks & there
+    return edge_arcs(first, second, point[None, None]), blocks, -jnp.sign(own)
