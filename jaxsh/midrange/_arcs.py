@@ -57,16 +57,21 @@ def edge_arcs(first: Vectors, second: Vectors, point: Vectors) -> Arcs:
     right to rounding down to |f| = 1e-4 of the distance of the corners: what the differences
     leave counts, since s and e are almost parallel there.
     """
+    # Stored, since each component of what follows takes all of it.
+    start, end, along, area = materialize(_between, first, second, point)
+    normal, line = _line(along, area)
+    return Arcs(start, end, normal, line, line)
+
+
+def _between(first: Vectors, second: Vectors, point: Vectors) -> tuple[Vectors, ...]:
+    """s, e, e - s and s × e."""
     (start, rest), (end, _), (along, left) = (
         difference(a, b) for a, b in ((first, point), (second, point), (second, first))
     )
-    if start.dtype == jnp.float32:
-        high, low = cross_high(start, along)
-        area = high + (low + cross(rest, along) + cross(start, left))
-    else:
-        area = cross(start, along)
-    normal, line = _line(along, area)
-    return Arcs(start, end, normal, line, line)
+    if start.dtype != jnp.float32:
+        return start, end, along, cross(start, along)
+    high, low = cross_high(start, along)
+    return start, end, along, high + (low + cross(rest, along) + cross(start, left))
 
 
 def resting_arcs(start: Rows, end: Rows, normal: Rows) -> Arcs:
@@ -77,7 +82,7 @@ def resting_arcs(start: Rows, end: Rows, normal: Rows) -> Arcs:
 
 
 def _line(along: Vectors, area: Vectors) -> tuple[Vectors, Vectors]:
-    """Of a line: area/|area| and along × area/|area|²."""
+    """Compute a line's area/|area| and along × area/|area|²."""
     inverse = inverse_length(area)
     normal = scale(inverse, area)
     return normal, scale(inverse, cross(along, normal))
@@ -105,7 +110,7 @@ def coefficients(
             flux = flux + normal[:, None] * integral[None]
         return flux, angle + _angle(triangle)
 
-    spans, triangles = _spans(arcs, apex)
+    spans, triangles = materialize(_spans, arcs, apex)
     nothing = _nothing(arcs.start, 3, degree**2), _nothing(arcs.start)
     flux, angle = _sum(add_arc, nothing, (spans, arcs.normal, triangles), active)
     return _from_flux(flux, angle, degree)
@@ -156,7 +161,7 @@ def coefficients_with_gradient(
 
     shapes = (3, lower), (3, (degree + 1) ** 2), ()
     nothing = tuple(_nothing(arcs.start, *shape) for shape in shapes)
-    spans, triangles = _spans(arcs, apex)
+    spans, triangles = materialize(_spans, arcs, apex)
     each = spans, arcs.normal, arcs.near, triangles
     flux, pull, angle = _sum(add_arc, nothing, each, active)
     return _from_flux(flux, angle, degree), -pull

@@ -46,9 +46,7 @@ def cut(start: Vectors, end: Vectors, start_side: Array, end_side: Array) -> tup
     return kept_start, kept_end, out, back
 
 
-def clip_horizon(
-    loops: Arcs, normal: Float[Array, "3 n"], orient: Float[Array, "loops n"]
-) -> Arcs:
+def clip_horizon(loops: Arcs, normal: Float[Array, "3 n"], orient: Float[Array, "loops n"]) -> Arcs:
     """The part of convex loops above the plane through the receiver with this unit normal.
 
     `orient` is 1 where a loop runs counter-clockwise, and -1 where it runs clockwise.
@@ -74,7 +72,7 @@ class Edges(NamedTuple):
 
 
 def edges_of(arcs: Arcs, axis: int) -> Edges:
-    """With an axis of length 1 more, for the cones."""
+    """Prepare edges for `within`, with an axis of length 1 more, for the cones."""
     turned = (cross(arcs.normal, row) for row in (arcs.start, arcs.end))
     return Edges(*(jnp.expand_dims(row, axis) for row in (arcs.normal, *turned)))
 
@@ -85,7 +83,7 @@ def within(
     along: bool | Bool[Array, "..."],
     against: bool,
 ) -> tuple[Number, Number]:
-    """From where to where edges are within convex cones, as shares of the edge: low < high.
+    """Find from where to where, low < high as shares of it, an edge is within convex cones.
 
     `planes` are the cones' outward unit normals, one after the other, whose axes and those of the
     edges broadcast; zeros are none. Both edges of a crossing place it at ±n × outward: so they
@@ -115,10 +113,8 @@ def within(
     return jax.lax.scan(by_plane, (zero, zero + 1), planes)[0]
 
 
-def left_over(
-    base: tuple[Number, Number], taken: tuple[Number, Number]
-) -> tuple[Number, Number]:
-    """What intervals (c, *any) that may overlap leave of one (*any): at most c + 1 intervals.
+def left_over(base: tuple[Number, Number], taken: tuple[Number, Number]) -> tuple[Number, Number]:
+    """Find what intervals (c, *any) that may overlap leave of one (*any): c + 1, or fewer.
 
     They begin where the base does or where one ends that is `taken`, and reach to where the next
     begins; those that do not begin there, because another covers it, are empty.
@@ -126,6 +122,10 @@ def left_over(
     low, high = base
     begin, end = jnp.maximum(taken[0], low[None]), jnp.minimum(taken[1], high[None])
     some = begin < end
+    if len(begin) == 1:
+        none = jnp.broadcast_to(high, some[0].shape)
+        lows = jnp.broadcast_to(low, none.shape), jnp.where(some, end, none)[0]
+        return jnp.stack(lows), jnp.stack([jnp.where(some, begin, none)[0], none])
     order = jnp.arange(len(begin), dtype=jnp.int32).reshape(-1, *(1,) * low.ndim)
 
     def piece(_, start):

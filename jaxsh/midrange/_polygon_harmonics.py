@@ -2,6 +2,7 @@
 
 import functools
 import math
+import warnings
 from collections.abc import Sequence
 
 import jax
@@ -47,18 +48,20 @@ def polygon_harmonics(
 
     **Arguments**
 
-    - `polygon`: concave or convex. From behind a one-sided polygon there is no light.
+    - `polygon`: concave or convex. From behind a one-sided polygon there is no light; where all
+      values are known and all points are behind, that is said by a warning.
     - `point`: (..., 3), the receivers. Pass all of them rather than use `jax.vmap`.
     - `degree`: the largest l, known at trace time.
     - `horizon`: unit normals (..., 3) of the receivers: only the part of the polygon above the
       plane through the point counts.
     - `blockers`: convex polygons, opaque from both sides, whose shadow is taken away. Only what
       lies in front of the polygon's plane casts one. Any number may overlap: the union counts
-      once, by inclusion and exclusion, at a cost that doubles with each.
+      once. The cost grows with the square of their number, and the first call with none.
 
     **Returns** (..., 3, K) in the dtype of `point`, for which vertices and radiance are cast; the
     batches of `point` and `horizon` broadcast. Relative rounding error about ε/angle where the
-    polygon is seen under a small angle (in radians).
+    polygon is seen under a small angle (in radians). Right beside a lamp float32 is within 1e-5
+    of float64, values and gradients, down to 1e-6 of the lamp's size from plane, edge and corner.
 
     Differentiable in vertices, radiance, point, horizon and blockers, forward and reverse. Zero
     with zero slope at points in the polygon's plane. At a point on an edge or vertex it is finite,
@@ -122,6 +125,7 @@ def _light(polygon, point, degree, horizon, blockers, gradient: bool):
     for blocker in blockers:
         if is_concrete(blocker.vertices) and not is_convex(np.asarray(blocker.vertices)):
             raise ValueError("a blocker must be convex, got a concave one: split it")
+    _check_side(polygon, point)
     clipped = horizon is not None or len(blockers) > 0
     convex = is_concrete(polygon.vertices) and is_convex(np.asarray(polygon.vertices))
     dtype = point.dtype
@@ -135,6 +139,23 @@ def _light(polygon, point, degree, horizon, blockers, gradient: bool):
         in_front=not polygon.two_sided and _all_in_front(polygon, blockers),
     )
     return _compiled(scene, point, normals.astype(dtype), polygon.radiance.astype(dtype), plan)
+
+
+def _check_side(polygon: Polygon, point: Float[Array, "*batch 3"]) -> None:
+    """Warn where values are known, and all points are behind a polygon that is dark from there."""
+    if polygon.two_sided or not (is_concrete(polygon.vertices) and is_concrete(point)):
+        return
+    if point.size == 0 or not point.is_fully_addressable:
+        return
+    vertices = np.asarray(polygon.vertices, np.float64)
+    normal = area_vector(vertices)
+    height = np.asarray(point) @ normal.astype(point.dtype) - vertices[0] @ normal
+    if (height < 0).all():
+        warnings.warn(
+            f"none of the {height.size} points is before the polygon, which is dark from behind: "
+            "reverse the order of its corners, or make it two_sided",
+            stacklevel=4,
+        )
 
 
 def _plane(polygon: Polygon, dtype) -> Float[Array, "2 3"]:
@@ -163,7 +184,7 @@ def _corners(blockers: Sequence[Polygon], dtype) -> Float[Array, "b m 3"]:
 
 
 def _all_in_front(polygon: Polygon, blockers: Sequence[Polygon]) -> bool:
-    """Whether values are known, and all of the blockers is on the light's side of its plane."""
+    """Tell if values are known, and all of the blockers is on the light's side of its plane."""
     if not all(is_concrete(shape.vertices) for shape in (polygon, *blockers)):
         return False
     vertices = np.asarray(polygon.vertices, np.float64)

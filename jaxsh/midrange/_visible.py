@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ._arcs import Arcs, Rows, coefficients, coefficients_with_gradient, edge_arcs
+from ._arcs import Arcs, coefficients, coefficients_with_gradient, edge_arcs
 from ._clip import clip_horizon, cut, edges_of, left_over, within
 from ._vectors import close_dot, cross, difference, dot, scale, select, unit
 
@@ -122,7 +122,7 @@ def _beside_blockers(
 
 
 def _parts(arcs: Arcs, share: tuple[Array, Array], flip: Bool[Array, "..."] | None) -> Arcs:
-    """From share to share of arcs, all in one axis; turned around in space where `flip`."""
+    """Cut arcs from share to share, all in one axis, turned around where `flip`."""
     first, last = (scale(1 - t, arcs.start) + scale(t, arcs.end) for t in share)
     normal = jnp.broadcast_to(arcs.normal, first.shape)
     if flip is not None:
