@@ -55,12 +55,13 @@ def seen(
     arcs, active = _flat(loops), None
     if len(scene.blockers):
         arcs, active = _beside_blockers(scene, loops, orient, ahead, point, plan)
-    integrate = coefficients_with_gradient if plan.gradient else coefficients
-    lights = integrate(arcs, apex, active, plan.degree)
+    if plan.gradient:
+        lights = list(coefficients_with_gradient(arcs, apex, active, plan.degree))
+    else:
+        lights = [coefficients(arcs, apex, active, plan.degree)]
     # What is seen from behind comes out negative.
     behind = -1 if plan.two_sided else 0
     side = jnp.where(ahead < 0, 1, jnp.where(ahead > 0, behind, 0)).astype(point.dtype)
-    lights = lights if plan.gradient else [lights]
     sides = (side.reshape((1,) * (light.ndim - 1) + side.shape) for light in lights)
     return [jnp.where(s != 0, s * light, 0) for s, light in zip(sides, lights, strict=True)]
 
@@ -108,9 +109,9 @@ def _beside_blockers(
         later = jnp.asarray(number[:, None] > number[None])[:, None, :, None]
         other = jnp.asarray(number[:, None] != number[None])[:, None, :, None]
         part = hidden(within(outwards, cones[:, None, None], later, True), other)
-        base = left_over(base, tuple(x[:, :, :, None] for x in part))
+        base = left_over(base, (part[0][:, :, :, None], part[1][:, :, :, None]))
     else:
-        base = tuple(x[None] for x in base)
+        base = base[0][None], base[1][None]
     flip = (orient[None] * turn[:, None] > 0)[None, :, None]
     edges = jax.tree.map(lambda row: row[None, :, :, None], edges)
     parts = [
