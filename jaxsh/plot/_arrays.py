@@ -27,7 +27,7 @@ def check_labels(name: str, labels: Sequence[str] | None, count: int) -> None:
     """Raises unless there are none, or one for each function."""
     if labels is None:
         return
-    check_all(name, labels, str, least=0)
+    check_all(name, list(labels) if isinstance(labels, str) else labels, str, least=0)
     if len(labels) != count:
         raise ValueError(f"expected {count} {name}, one per function, got {len(labels)}")
 
