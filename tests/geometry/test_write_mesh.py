@@ -309,6 +309,27 @@ def test_hard_edges_and_seams_come_back(tmp_path, full, suffix):
         np.testing.assert_allclose(theirs[read.faces], ours[order], rtol=0, atol=off)
 
 
+def test_names_of_any_text_and_a_path_with_blanks(tmp_path, plain):
+    path = tmp_path / "my own mesh.obj"
+    odd = ["a b", "\ud800 \n é", ""]
+    mesh = Mesh(
+        plain.vertices,
+        plain.faces,
+        plain.normals,
+        plain.uv,
+        face_material=jnp.asarray(np.arange(len(plain.faces)) * 3 // len(plain.faces), jnp.int32),
+        materials=tuple(BaseColor(name, texture=plain.materials[0].texture) for name in odd),
+    )
+    assert written(path, mesh) == ""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read = read_mesh(path)
+    same(read, mesh, ".obj")
+    assert [one.name for one in read.materials] == ["a_b", "?_é", "material_2"]
+    written(path.with_suffix(".glb"), mesh)
+    same(read_mesh(path.with_suffix(".glb")), mesh, ".glb")
+
+
 def test_origin_comes_back(tmp_path, plain):
     for suffix in (".ply", ".obj", ".glb", ".off"):
         mesh = Mesh(plain.vertices, plain.faces, plain.normals, origin=(4e5, 8e5, -32.0))
@@ -347,6 +368,7 @@ def test_origin_is_added_back(tmp_path, full):
     ("change", "reason"),
     [
         ({"vertices": "nan"}, "1 values of vertices are NaN or infinite"),
+        ({"colors": np.full((COUNT, 4), -0.5, "f4")}, "48 values of colors are negative"),
         ({"normals": np.ones((3, 3), "f4")}, r"normals must be floats \(12, 3\), got float32"),
         ({"faces": np.array([[0, 1, 12]])}, "faces name vertices 0 to 12, but there are 12"),
         ({"faces": np.array([[0, -1, 2]])}, "faces name vertices -1 to 2, but there are 12"),

@@ -68,6 +68,8 @@ def problem(arrays: Arrays) -> str | None:
             return f"{name} must be floats ({count}, {width}), got {array.dtype} {array.shape}"
         if bad := int((~np.isfinite(array)).sum()):
             return f"{bad} values of {name} are NaN or infinite"
+        if name == "colors" and (dark := int((array < 0).sum())):
+            return f"{dark} values of colors are negative"
     faces, chosen = arrays.faces, arrays.face_material
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu" or not len(faces):
         return f"faces must be whole numbers (f, 3) with f > 0, got {faces.dtype} {faces.shape}"

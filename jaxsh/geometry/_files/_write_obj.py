@@ -47,7 +47,7 @@ def obj_files(arrays: Arrays, stem: str) -> dict[str, bytes]:
         if end > start and chosen[start] >= 0:
             text += f"usemtl {names[chosen[start]]}\n"
         text += rows_of_text(form, lines[start:end])
-    return {**files, "": text.encode()}
+    return {**files, "": text.encode(errors="replace")}
 
 
 def _unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -81,4 +81,4 @@ def _material_files(
         if material.texture is not None:
             files[f"{stem}_{i}.png"] = png(np.asarray(material.texture))
             text += f"map_Kd {stem}_{i}.png\n"
-    return {**files, f"{stem}.mtl": text.encode()}
+    return {**files, f"{stem}.mtl": text.encode(errors="replace")}
