@@ -73,7 +73,7 @@ def _beside_blockers(
     ahead: Float[Array, " n"],
     point: Float[Array, "3 n"],
     plan: Plan,
-) -> tuple[Arcs, Bool[Array, " arcs"]]:
+) -> tuple[Arcs, Bool[Array, " arcs"] | None]:
     """All arcs of the light outside of the blockers' cones, and which of them anybody has.
 
     Parts of the light's edges outside of all cones, and the other way around parts of the
@@ -119,7 +119,9 @@ def _beside_blockers(
         _parts(edges, base, flip),
     ]
     active = [_flat_rows(high > low, 1).any(axis=-1) for low, high in (lit, base)]
-    return jax.tree.map(lambda *rows: jnp.concatenate(rows), *parts), jnp.concatenate(active)
+    # Beside one blocker there is too little to leave out.
+    together = jax.tree.map(lambda *rows: jnp.concatenate(rows), *parts)
+    return together, jnp.concatenate(active) if count > 1 else None
 
 
 def _parts(arcs: Arcs, share: tuple[Array, Array], flip: Bool[Array, "..."] | None) -> Arcs:
