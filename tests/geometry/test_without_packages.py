@@ -81,11 +81,11 @@ def test_the_bake_and_the_picture_are_those_of_embree(monkeypatch):
     np.testing.assert_array_equal(face, known[1])
 
 
-def test_hdr_pictures_name_the_package_they_need(monkeypatch, tmp_path):
+def test_exr_pictures_name_the_package_they_need(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "OpenImageIO", None)
-    (tmp_path / "probe.hdr").write_bytes(b"#?RADIANCE\n")
-    with pytest.raises(ImportError, match=r"probe\.hdr: reading \.hdr needs the package OpenImag"):
-        imaging.read_environment(tmp_path / "probe.hdr")
+    (tmp_path / "probe.exr").write_bytes(b"v/1\x01\x02\0\0\0")
+    with pytest.raises(ImportError, match=r"probe\.exr: reading \.exr needs the package OpenImag"):
+        imaging.read_environment(tmp_path / "probe.exr")
 
 
 def test_scenes_of_embree_where_it_is_installed():
