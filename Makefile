@@ -17,8 +17,6 @@ PRESET ?= quick
 bin := $(VENV)/bin
 # loadfile: what one file has traced serves its other tests.
 PARALLEL ?= -n auto --dist loadfile
-# What JAX itself may break.
-NUMERICAL := adaptive geometry harmonics inverse midrange sky sphere transfer
 # Unoptimized machine code, by XLA's older way for loops on the CPU where this JAX still knows it: that
 # runs slower and compiles in half the time, which is most of what tests do. Slow tests, test-all and
 # a plain pytest go without.
@@ -36,6 +34,13 @@ $(VENV)/installed: pyproject.toml
 	$(call environment,$(VENV))
 	$(bin)/python -m pip install --quiet --editable . --group check
 	touch $@
+
+# pytest in an environment, with those of the flags above that its JAX knows.
+define quickly
+flags=""; for flag in $(QUICK_COMPILE); do \
+		XLA_FLAGS="$$flag" $(1)/bin/python -c "import jax; jax.devices()" 2> /dev/null && flags="$$flags $$flag"; \
+	done; XLA_FLAGS="$(XLA_FLAGS) $$flags" $(1)/bin/python -m pytest $(PARALLEL)
+endef
 
 # Peers hold JAX back, so they get an environment of their own.
 $(BENCH_VENV)/installed: pyproject.toml
@@ -61,9 +66,7 @@ reproduce: $(VENV)/installed
 	$(bin)/python -m experiments run first_light environment --preset $(PRESET)
 
 test: $(VENV)/installed
-	flags=$$(XLA_FLAGS="$(QUICK_COMPILE)" $(bin)/python -c "import jax; jax.devices()" 2> /dev/null \
-		&& echo "$(QUICK_COMPILE)" || true); \
-	XLA_FLAGS="$(XLA_FLAGS) $$flags" $(bin)/python -m pytest $(PARALLEL) tests
+	$(call quickly,$(VENV)) tests
 
 test-slow: $(VENV)/installed
 	$(bin)/python -m pytest $(PARALLEL) jaxsh
@@ -76,7 +79,7 @@ test-oldest: $(OLDEST_VENV)/installed
 	$(OLDEST_VENV)/bin/python -m pytest $(PARALLEL) tests/harmonics tests/sphere tests/transfer/test_diffuse.py tests/sky/test_preetham.py
 
 test-newest: $(NEWEST_VENV)/installed
-	$(NEWEST_VENV)/bin/python -m pytest $(PARALLEL) $(addprefix tests/,$(NUMERICAL))
+	$(call quickly,$(NEWEST_VENV)) tests/harmonics tests/geometry/test_mesh.py tests/inverse tests/*/test_sharding.py
 
 test-minimal: $(VENV)/installed
 	$(bin)/python -m pytest tests/test_import.py -k without
