@@ -144,7 +144,10 @@ def missing(kind: str) -> list[str]:
 
 
 def _flat(kind: str, path: Path) -> bool:
-    """Tell whether all polygons lie in planes: others have an area for each way to cut them."""
+    """Tell whether all polygons lie in planes and pass each point once.
+
+    Others have an area for each way to cut them, or are cut wrongly by others.
+    """
     from jaxsh.geometry._read import _PARSERS
 
     with warnings.catch_warnings():
@@ -153,6 +156,8 @@ def _flat(kind: str, path: Path) -> bool:
     ends = np.cumsum(polygons.sizes)
     for start, end in zip(ends - polygons.sizes, ends, strict=True):
         ring = polygons.positions[polygons.corners[start:end]]
+        if len(np.unique(ring, axis=0)) < len(ring):
+            return False
         ring = ring - ring.mean(axis=0)
         extents = np.linalg.svd(ring, compute_uv=False)
         if end - start > 3 and extents[2] > 1e-4 * extents[1]:
