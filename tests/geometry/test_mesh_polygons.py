@@ -28,6 +28,10 @@ FLAT = {
     "corners on sides": ([(0, 0), (1, 0), (2, 0), (2, 2), (1, 2), (0, 2), (0, 1)], 4),
     "three corners and one between": ([(0, 0), (1, 0), (2, 0), (0, 2)], 2),
     "repeated corners": ([(0, 0), (0, 0), (2, 0), (2, 1), (2, 1), (0, 1)], 2),
+    "bridge to a hole": (
+        [(0, 0), (4, 0), (4, 4), (0, 4), (0, 0), (1, 1), (1, 3), (3, 3), (3, 1), (1, 1)],
+        12,
+    ),
     "comb": (
         [
             (0, 0),
@@ -38,6 +42,18 @@ FLAT = {
         None,
     ),
     "circle of 40": ([(np.cos(t), np.sin(t)) for t in np.arange(40) / 20 * np.pi], None),
+}
+# The outline runs out along a line and back: no triangle reaches the end of it.
+SPIKES = {
+    "spike out": ([(0, 0), (2, 0), (3, 0), (2, 0), (2, 2), (0, 2)], 4),
+    "spike in": ([(0, 0), (2, 0), (2, 2), (1, 2), (1, 1), (1, 2), (0, 2)], 4),
+    "spike half back": ([(0, 0), (3, 0), (2, 0), (2, 2), (0, 2)], 4),
+    "bent spike": ([(0, 0), (2, 0), (3, 0), (3, 1), (3, 0), (2, 0), (2, 2), (0, 2)], 4),
+    "four corners with a spike": ([(0, 0), (2, 0), (1, 0), (1, 1)], 0.5),
+    "bridge to an island": (
+        [(0, 0), (1, 0), (1, 1), (3, 1), (3, 0), (4, 0), (4, 2), (3, 2), (3, 1), (1, 1), (0, 1)],
+        3,
+    ),
 }
 
 
@@ -76,6 +92,24 @@ def test_area_and_side_are_kept_from_any_first_corner(rng, name, offset):
         )
         cuts.add(frozenset(frozenset(map(tuple, positions[ring[s]])) for s in slots))
     assert len(cuts) == 1
+
+
+@pytest.mark.parametrize("name", SPIKES)
+@pytest.mark.parametrize("offset", [0, 1e5])
+def test_a_spike_has_no_area(rng, name, offset):
+    corners, area = SPIKES[name]
+    assert shoelace(corners) == area
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    positions = np.c_[np.array(corners, float), np.zeros(len(corners))] @ turn.T + offset
+    for first in range(len(corners)):
+        ring = np.roll(np.arange(len(corners)), -first)
+        slots, _, crossed = triangulate(positions, ring, np.array([len(ring)]))
+        along = area_vectors(positions, ring[slots]) @ turn[:, 2]
+        assert not crossed
+        # At 1e5 the spike is 7e-12 wide.
+        np.testing.assert_allclose(along.sum(), area, rtol=1e-9)
+        np.testing.assert_allclose(np.abs(along).sum(), area, rtol=1e-9)
 
 
 def test_random_stars_keep_their_area(rng):

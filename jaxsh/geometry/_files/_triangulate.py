@@ -202,20 +202,21 @@ def _cut(ring: np.ndarray) -> tuple[np.ndarray, bool]:
     tips = (lengths[thin].argmax(axis=1)[:, None] + np.arange(3)) % 3
     tips = np.take_along_axis(triangles[thin], tips, axis=1)
     gaps = {(before, after): [tip] for tip, after, before in tips.tolist()}
-    return (_with_all_corners(triangles[~thin], k, gaps) + start) % k, crosses
+    return (_with_all_corners(triangles[~thin], flat, gaps) + start) % k, crosses
 
 
 def _with_all_corners(
-    triangles: np.ndarray, k: int, gaps: dict[tuple[int, int], list[int]]
+    triangles: np.ndarray, flat: np.ndarray, gaps: dict[tuple[int, int], list[int]]
 ) -> np.ndarray:
     """Put corners on sides of triangles: those of `gaps`, and those that earcut leaves out.
 
     A neighbor may have them, and would no longer meet this polygon there.
     """
+    k = len(flat)
     inside = {tip for (tip,) in gaps.values()}
     used = np.unique([*triangles.ravel(), *inside])
     gaps = gaps | {
-        (int(a), int(b)): [(int(a) + i) % k for i in range(1, (int(b) - int(a)) % k)]
+        (int(a), int(b)): _on_side(flat, (int(a) + np.arange((b - a) % k + 1)) % k)
         for a, b in zip(used, np.roll(used, -1), strict=True)
         if (b - a) % k > 1
     }
@@ -230,3 +231,20 @@ def _with_all_corners(
         else:
             done.append([a, b, c])
     return np.array(done, np.int64).reshape(-1, 3)
+
+
+def _on_side(flat: np.ndarray, chain: np.ndarray) -> list[int]:
+    """Keep those corners of a chain that lead from its first to its last without turning back.
+
+    The others are on a spike: the outline runs out along a line and back, around no area.
+    """
+    arms = flat[chain[1:-1]] - flat[chain[0]]
+    side = flat[chain[-1]] - flat[chain[0]]
+    squared = max(side @ side, np.finfo(np.float64).tiny)
+    along, off = arms @ side / squared, np.abs(arms @ [side[1], -side[0]]) / squared
+    kept, last = [], 0.0
+    for corner, share, beside in zip(chain[1:-1].tolist(), along, off, strict=True):
+        if last < share < 1 and beside <= _THIN:
+            kept.append(corner)
+            last = share
+    return kept
