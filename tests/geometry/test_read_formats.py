@@ -151,6 +151,31 @@ def test_obj_materials_and_pictures_are_those_beside_the_file(tmp_path):
         assert phrase in said
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+@pytest.mark.parametrize("names", [("Müller", "Möller"), ("#1", "#2"), ("a#b", "a#c")])
+def test_obj_names_stay_apart(tmp_path, names, encoding):
+    one, two = names
+    library = f"# lib\n newmtl {one}\nKd 1 0 0 # red\nnewmtl {two} # second\nKd 0 1 0\n#end"
+    for place in ("gr\xfcn #1.mtl", "#2.mtl", "c.mtl"):
+        (tmp_path / place).write_bytes(library.encode(encoding))
+        text = f"mtllib {place}\n{TRIANGLE}v 1 1 0\nusemtl {one} # red\nf 1 2 3\n"
+        text += f"usemtl {two}\nf 4 3 2\n"
+        mesh, said = read(tmp_path / "a.obj", text.encode(encoding))
+        assert said == ""
+        assert [(m.name, m.factor[:3]) for m in mesh.materials] == [
+            (one, (1, 0, 0)),
+            (two, (0, 1, 0)),
+        ]
+        assert mesh.face_material.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("line", ["1.#IND 0 0", "0 -1.#QNAN00 1.#INF # 1.#IND", "0 1.#ind 1.#Inf"])
+def test_obj_odd_nan_is_no_comment(tmp_path, line):
+    mesh, said = read(tmp_path / "a.obj", f"{TRIANGLE}v {line}\nv 1 1 1.#x\nf 1 2 3\nfo 2 5 3")
+    assert said == "1 NaN or infinite vertices dropped"
+    assert corners(mesh)[1].tolist() == [[1, 0, 0], [1, 1, 1], [0, 1, 0]]
+
+
 @pytest.mark.parametrize(
     ("values", "encoding", "expected"),
     [

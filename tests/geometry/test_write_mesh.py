@@ -309,15 +309,16 @@ def test_hard_edges_and_seams_come_back(tmp_path, full, suffix):
         np.testing.assert_allclose(theirs[read.faces], ours[order], rtol=0, atol=off)
 
 
-def test_names_of_any_text_and_a_path_with_blanks(tmp_path, plain):
-    path = tmp_path / "my own mesh.obj"
-    odd = ["a b", "\ud800 \n é", ""]
+@pytest.mark.parametrize("stem", ["my own mesh", "x #1", "#2", "-bm 1", "a\\", ' "b" '])
+def test_names_of_any_text_and_a_path_of_any(tmp_path, plain, stem):
+    path = tmp_path / f"{stem}.obj"
+    odd = ["a b", "\ud800 \n é", "", "#", "#c", "d\\"]
     mesh = Mesh(
         plain.vertices,
         plain.faces,
         plain.normals,
         plain.uv,
-        face_material=jnp.asarray(np.arange(len(plain.faces)) * 3 // len(plain.faces), jnp.int32),
+        face_material=jnp.asarray(np.arange(len(plain.faces)) * 6 // len(plain.faces), jnp.int32),
         materials=tuple(BaseColor(name, texture=plain.materials[0].texture) for name in odd),
     )
     assert written(path, mesh) == ""
@@ -325,7 +326,7 @@ def test_names_of_any_text_and_a_path_with_blanks(tmp_path, plain):
         warnings.simplefilter("error")
         read = read_mesh(path)
     same(read, mesh, ".obj")
-    assert [one.name for one in read.materials] == ["a_b", "?_é", "material_2"]
+    assert [one.name for one in read.materials] == ["a_b", "?_é", "material_2", "_", "_c", "d_"]
     written(path.with_suffix(".glb"), mesh)
     same(read_mesh(path.with_suffix(".glb")), mesh, ".glb")
 

@@ -163,6 +163,17 @@ def test_one_channel_is_gray(tmp_path, picture, name):
     np.testing.assert_array_equal(read_environment(path), expected)
 
 
+def test_a_vector_is_no_picture(tmp_path, picture):
+    names = ("normal.X", "normal.Y", "normal.Z", "view.R", "view.G", "view.B")
+    path = save(tmp_path / "a.exr", np.concatenate([-picture, picture], axis=2), names)
+    np.testing.assert_array_equal(read_environment(path), picture)
+    with pytest.raises(ValueError, match="no layer 'normal'"):
+        read_environment(path, layer="normal")
+    path = save(tmp_path / "b.exr", picture, ("X", "Y", "Z"))
+    with pytest.raises(ValueError, match="needs channels R, G, B or a single one"):
+        read_environment(path)
+
+
 def by_hand(path, planes, sampling=None):
     """An uncompressed file of planes by name, uint32 or float32, as OpenEXR's layout says."""
     planes = dict(sorted(planes.items()))

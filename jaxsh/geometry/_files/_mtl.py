@@ -8,7 +8,7 @@ from jaxtyping import UInt8
 
 from .._base_color import BaseColor
 from ._pictures import beside, read_picture
-from ._text import plain_text
+from ._text import decode, plain_text, without_comment
 
 # How many words follow each option of a map at least, and at most where they are numbers.
 _OPTIONS = {
@@ -31,7 +31,8 @@ class Materials:
         self._pictures: dict[Path | str, UInt8[np.ndarray, "h w 4"] | None] = {}
         # A line may name several files, and a name may hold blanks.
         for line in files:
-            names = [line] if beside(path, line) else re.split(r"(?<!\\)\s+", line)
+            words = re.split(r"(?<!\\)\s+", without_comment(line))
+            names = [line] if beside(path, line) else words
             for name in (one.replace("\\ ", " ") for one in names):
                 place = beside(path, name)
                 if place is None:
@@ -62,18 +63,21 @@ class Materials:
     def _read(self, place: Path) -> None:
         """Collect the statements of each material of a file; of two with one name the first."""
         try:
-            text = plain_text(place.read_bytes()).decode("utf-8", errors="replace")
+            lines = plain_text(place.read_bytes()).split(b"\n")
         except OSError as error:
             self._found.append(f"the materials {place.name!r} cannot be read ({error.strerror})")
             return
         kept: dict[str, str] = {}  # what stands before the first material belongs to none
-        for line in text.splitlines():
-            key, rest = ([*re.sub(r"(^|\s)#.*", "", line).split(None, 1), "", ""])[:2]
+        for line in map(decode, lines):
+            key, rest = [*line.split(None, 1), "", ""][:2]
+            if key.startswith("#"):
+                continue
+            rest = without_comment(rest)
             if key.lower() == "newmtl":
                 kept = {}
-                self._statements.setdefault(rest.strip(), (kept, place))
+                self._statements.setdefault(rest, (kept, place))
             elif key:
-                kept[key.lower()] = rest.strip()
+                kept[key.lower()] = rest
 
     def _color(self, name: str, kept: dict[str, str], place: Path) -> BaseColor:
         red, green, blue = self._triple(name, kept.get("kd", "1 1 1"))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ._mtl import Materials
 from ._polygons import Polygons
-from ._text import JOINT, Words, parse, plain_text, ranges, unit_colors
+from ._text import JOINT, Words, decode, parse, plain_text, ranges, unit_colors, without_comment
 
 # Every statement of the format (Wavefront's appendix B1): a damaged "f" must not pass for another.
 _STATEMENTS = re.compile(
@@ -16,6 +16,8 @@ _STATEMENTS = re.compile(
     "bevel|c_interp|d_interp|lod|usemap|maplib|usemtl|mtllib|shadow_obj|trace_obj|ctech|stech|"
     "bsp|bzp|cdc|cdp|res|call|csh|fo|t|vw"
 )
+# Not in 1.#IND and the like, which some systems print for a value that is none.
+_COMMENT = re.compile(rb"(?<!1\.)#|#(?!(?:qnan|snan|ind|inf))", re.I)
 # Statements that are left out, and said so.
 _OTHERS = {
     "p": "points",
@@ -39,7 +41,7 @@ def read_obj(path: Path, data: bytes) -> Polygons:
     """
     text = plain_text(data) + b"\n"
     # Both leave all other words at their places.
-    plain = re.sub(rb"#[^\n]*", lambda m: b" " * len(m[0]), text)
+    plain = re.sub(rb"#[^\n]*", _blanks, text)
     plain = re.sub(rb"\\[ \t]*\n", lambda m: b" " * (len(m[0]) - 1) + JOINT, plain)
     words, found = Words(plain), []
     kinds = _kinds(words)
@@ -66,9 +68,18 @@ def read_obj(path: Path, data: bytes) -> Polygons:
     )
 
 
+def _blanks(match: re.Match[bytes]) -> bytes:
+    """Give blanks for what stands from # to the end of a line, as far as it is a comment."""
+    begin, end = match.span()
+    comment = _COMMENT.search(match.string, begin, end)
+    at = comment.start() if comment else end
+    return match.string[begin:at] + b" " * (end - at)
+
+
 def _kinds(words: Words) -> dict[str, np.ndarray]:
     """Tell for each statement of interest which lines hold it; count or refuse the others."""
     kinds = {name: words.equal(words.first, name.encode()) for name in ("v", "vt", "vn", "f", "s")}
+    kinds["f"] |= words.equal(words.first, b"fo")  # the same in old files
     rest = np.ones(len(words.first), bool)
     for lines in kinds.values():
         rest &= ~lines
@@ -210,10 +221,11 @@ def _materials(path: Path, words: Words, text: bytes, kinds, found: list[str]):
     def names(kind: str) -> list[str]:
         starts = words.starts[words.first[kinds[kind]]] + len(kind)
         lines = (text[start : text.find(b"\n", start)] for start in starts.tolist())
-        return [re.sub(r"(^|\s)#.*", "", line.decode(errors="replace")).strip() for line in lines]
+        return [decode(line).strip() for line in lines]
 
     materials = Materials(path, names("mtllib"), found)
-    rows = np.array([-1, *(materials.row(name) for name in names("usemtl"))])
+    used = (without_comment(name) for name in names("usemtl"))
+    rows = np.array([-1, *(materials.row(name) for name in used)])
     last = np.searchsorted(kinds["usemtl"], np.flatnonzero(kinds["f"]))
     return rows[last], materials.table()
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._text import Words, plain_text, ranges
+from ._text import Words, decode, plain_text, ranges
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -61,7 +61,7 @@ def read_header(data: bytes) -> Header:
         stop = data.find(end[1], at)
         if stop < 0:
             raise ValueError("its header is not whole")
-        line = data[at:stop].decode("utf-8", errors="replace").strip()
+        line = decode(data[at:stop]).strip()
         at = stop + len(end[1])
         match line.split():
             case ["end_header"]:
@@ -85,7 +85,10 @@ def read_header(data: bytes) -> Header:
             case ["property", kind, name] if elements and kind in _TYPES:
                 elements[-1].properties.append(Property(name.lower(), _TYPES[kind]))
             case ["element" | "property" | "format", *_]:
-                raise ValueError(f"its header has the line {line[:60]!r}")
+                raise ValueError(
+                    f"its header has the line {line[:60]!r}, which is no format, number of "
+                    f"elements or type that PLY has"
+                )
             case _:  # a comment broken in two, say
                 ignored += 1
     if order is None:

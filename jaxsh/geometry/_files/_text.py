@@ -10,6 +10,7 @@ _BLANK = np.zeros(256, bool)
 _BLANK[list(b" \t\n\v\f\r")] = True
 # What the C libraries of some systems print for a value that is none.
 _ODD_NAN = re.compile(rb"[-+]?(?:nan\(\w*\)|1\.#(?:qnan|snan|ind|inf)\d*)", re.I)
+_COMMENT = re.compile(r"\s#.*|^#(?=\s|$).*")
 # A line that goes on in the next is joined to it by this blank, so that lines can be counted.
 JOINT = b"\v"
 
@@ -22,6 +23,19 @@ def plain_text(data: bytes) -> bytes:
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return data
+
+
+def decode(line: bytes) -> str:
+    """Give a line as text: UTF-8, or Latin-1 where it is not that, so that names stay apart."""
+    try:
+        return line.decode()
+    except UnicodeDecodeError:
+        return line.decode("latin-1")
+
+
+def without_comment(name: str) -> str:
+    """Cut off what begins with # behind a blank; a name itself may begin so."""
+    return _COMMENT.sub("", name).strip()
 
 
 class Words:

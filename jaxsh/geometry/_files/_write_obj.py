@@ -1,5 +1,7 @@
 """Write OBJ, with its materials in an .mtl file and their textures in .png files beside it."""
 
+import re
+
 import numpy as np
 
 from ..._core import srgb
@@ -34,6 +36,8 @@ def obj_files(arrays: Arrays, stem: str) -> dict[str, bytes]:
     if not arrays.materials:
         return {"": (text + rows_of_text(form, lines)).encode()}
 
+    # Readers may take these for comments, the next line, options, or the end.
+    stem = re.sub(r'[#\\"]|[^\S ]|^[- ]| $', "_", stem)
     names = _unique_names(arrays.materials)
     files = _material_files(names, arrays.materials, stem)
     text = f"mtllib {stem}.mtl\n" + text
@@ -60,10 +64,11 @@ def _unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _unique_names(materials: tuple[BaseColor, ...]) -> list[str]:
-    """Give each material a word of its own: names end at a blank in many readers."""
+    """Give each material a word of its own: names end at a blank in many readers, and at #."""
     names: list[str] = []
     for i, material in enumerate(materials):
-        name = "_".join(material.name.split()) or f"material_{i}"
+        words = re.sub(r"[#\\]", "_", material.name).split()
+        name = "_".join(words) or f"material_{i}"
         while name in names:
             name = f"{name}_{i}"
         names.append(name)

@@ -58,6 +58,8 @@ def _colors(names: dict[str, int]) -> tuple[list[int], Kind] | None:
         return [names[c] for c in "RGB"], "rgb"
     if all(c in names for c in ("Y", "RY", "BY")):
         return [names[c] for c in ("Y", "RY", "BY")], "luminance-chroma"
+    if "X" in names:  # of a vector, as a pass of normals has: no brightness
+        return None
     if "Y" in names:
         return [names["Y"]], "gray"
     colors = [i for name, i in names.items() if name not in _NOT_COLOR]
