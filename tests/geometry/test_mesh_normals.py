@@ -1,6 +1,7 @@
 """Hard edges, file normals, large coordinates, the axis that points up."""
 
 import itertools
+import warnings
 
 import numpy as np
 import pytest
@@ -166,6 +167,21 @@ def test_an_origin_is_taken_off_only_where_shape_is_lost(tmp_path):
     np.testing.assert_array_equal(np.unique(np.asarray(mesh.vertices), axis=0), sorted(CORNERS))
     mesh = read_mesh(path, origin=(1e9 - 2, 0, 0), up="y")
     np.testing.assert_array_equal(np.asarray(mesh.vertices)[:, 0] % 2, np.ones(24))
+
+
+def test_parts_too_far_apart_for_float32_are_said(rng):
+    vertices, faces = shapes.TETRAHEDRON
+    vertices = vertices @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    both = np.concatenate([faces, faces + len(vertices)])
+    for far, moved in ((1e5, False), (1e7, True)):  # float32 rounds by 0.004, 0.5
+        apart = np.concatenate([vertices, vertices + np.array([far, 0, 0])])
+        for given, expected in ((apart, moved), (apart.astype(np.float32), False)):
+            with warnings.catch_warnings(record=True) as record:
+                warnings.simplefilter("always")
+                mesh = make_mesh(given, both)
+            assert mesh.origin == (0, 0, 0)
+            said = "".join(str(one.message) for one in record)
+            assert ("of the faces by over 1/20 of their size" in said) == expected
 
 
 @pytest.mark.parametrize("origin", [(1, 2), (np.nan, 0, 0), "here", 3.0])
