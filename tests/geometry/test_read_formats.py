@@ -151,6 +151,25 @@ def test_obj_materials_and_pictures_are_those_beside_the_file(tmp_path):
         assert phrase in said
 
 
+@pytest.mark.parametrize(
+    ("lines", "factor", "phrase"),
+    [
+        ("Kd 255 128 0", (255, 128, 0, 1), "Kd '255 128 0' of the material 'a' is over 1"),
+        ("Kd -1 0 0", (1, 1, 1, 1), "Kd '-1 0 0' of the material 'a' ignored"),
+        ("Kd 0 1e400 0", (1, 1, 1, 1), "Kd '0 1e400 0' of the material 'a' ignored"),
+        ("d 255\nTr 0.25", (1, 1, 1, 0.75), "d '255' of the material 'a' ignored"),
+        ("Tr -1", (1, 1, 1, 1), "tr '-1' of the material 'a' ignored"),
+        ("Kd 0 0 0\nKe 0 2 0\nnorm a.png", (0, 0, 0, 1), "of materials ignored (ke norm)"),
+        ("Ke 0 0 0\nPr 0.5", (1, 1, 1, 1), ""),
+    ],
+)
+def test_mtl_numbers_out_of_range(tmp_path, lines, factor, phrase):
+    (tmp_path / "a.mtl").write_text(f"newmtl a\n{lines}\n")
+    mesh, said = read(tmp_path / "a.obj", f"mtllib a.mtl\n{TRIANGLE}usemtl a\nf 1 2 3\n")
+    assert mesh.materials[0].factor == factor
+    assert said == phrase
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
 @pytest.mark.parametrize("names", [("Müller", "Möller"), ("#1", "#2"), ("a#b", "a#c")])
 def test_obj_names_stay_apart(tmp_path, names, encoding):
@@ -182,13 +201,17 @@ def test_obj_odd_nan_is_no_comment(tmp_path, line):
         ("0.2 0 1", None, (LINEAR[51], 0, 1, 1)),
         ("51 0 255", None, (LINEAR[51], 0, 1, 1)),
         ("0.2 0 1", "linear", (0.2, 0, 1, 1)),
+        ("2.5 -1 1", "linear", (2.5, 0, 1, 1)),
         ("0.2 0 1 0.5", "srgb", (LINEAR[51], 0, 1, 0.5)),
     ],
 )
 def test_obj_colors_are_decoded(tmp_path, values, encoding, expected):
+    phrase = "colors up to 255 taken for bytes" if "255" in values else ""
+    if "2.5" in values:
+        phrase = "colors from -1 to 2.5 taken as they are but for negative ones, which become 0"
     text = f"v 0 0 0 {values}\nv 1 0 0 {values}\nv 0 1 0\nf 1 2 3\n"
     mesh, said = read(tmp_path / "a.obj", text, colors=encoding)
-    assert said == ("colors up to 255 taken for bytes" if "255" in values else "")
+    assert said == phrase
     np.testing.assert_allclose(mesh.colors, [expected, expected, (1, 1, 1, 1)], atol=1e-7)
 
 

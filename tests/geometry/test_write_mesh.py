@@ -176,6 +176,28 @@ def glb(path):
     return content, arrays, parts
 
 
+def test_colors_over_1(tmp_path, plain):
+    """Readers of glTF must cut them off; the others have them in sRGB."""
+    colors = np.asarray(plain.colors).copy()
+    colors[0] = 4, 0.5, 1.5, 1
+    colors[:, 3] = 1
+    mesh = Mesh(plain.vertices, plain.faces, plain.normals, colors=jnp.asarray(colors))
+    for suffix in (".glb", ".ply", ".obj"):
+        path = tmp_path / f"a{suffix}"
+        glb = suffix == ".glb"
+        assert written(path, mesh) == (
+            f"{path}: left out, as .glb has none: colors over 1" if glb else ""
+        )
+        phrase = (
+            "1 primitives have colors over 1, cut off as glTF says" if glb else " to 1.82 taken"
+        )
+        with pytest.warns(UserWarning, match=phrase):
+            read = read_mesh(path)
+        expected = np.minimum(colors, 1) if glb else colors
+        met = np.asarray(read.colors)[np.asarray(read.faces)]
+        np.testing.assert_allclose(met, expected[np.asarray(mesh.faces)], rtol=1e-6, atol=2e-7)
+
+
 def test_glb_holds_each_number_to_the_bit(tmp_path, full):
     path = tmp_path / "full.glb"
     assert written(path, full) == ""

@@ -95,6 +95,8 @@ def _read_part(
     uv, colors = values.get("TEXCOORD"), values.get("COLOR_0")
     if colors is not None:
         opaque = np.ones((len(colors), 4 - colors.shape[1]))
+        if (colors > 1 + 1e-6).any():
+            document.note("primitives have colors over 1, cut off as glTF says")
         colors = np.clip(np.concatenate([colors, opaque], axis=1), 0, 1)
     joints, shares = _influences(vertices, used)
     return Part(

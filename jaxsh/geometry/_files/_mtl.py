@@ -1,5 +1,6 @@
 """Read the materials of an OBJ file: base color and its picture."""
 
+import math
 import re
 from pathlib import Path
 
@@ -18,6 +19,8 @@ _OPTIONS = {
     "-mm": (2, 2),
     **dict.fromkeys(("-o", "-s", "-t"), (1, 3)),
 }
+# Statements of maps other than the base color's: the beginnings of their keys.
+_MAPS = ("map_", "bump", "disp", "decal", "norm", "refl")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.I)
 
 
@@ -81,10 +84,12 @@ class Materials:
 
     def _color(self, name: str, kept: dict[str, str], place: Path) -> BaseColor:
         red, green, blue = self._triple(name, kept.get("kd", "1 1 1"))
-        alpha = self._share(kept.get("d"), 1.0)
-        if "d" not in kept:
-            alpha = 1 - self._share(kept.get("tr"), 0.0)
-        maps = {key for key in kept if key.startswith(("map_", "bump", "disp", "decal"))}
+        alpha = self._share(name, "d", kept)
+        if alpha is None:
+            alpha = 1 - (self._share(name, "tr", kept) or 0.0)
+        maps = {key for key in kept if key.startswith(_MAPS)}
+        if any(float(word) > 0 for word in kept.get("ke", "").split() if _NUMBER.fullmatch(word)):
+            maps.add("ke")  # it gives off light
         self._unread |= maps - {"map_kd"}
         texture = None
         if "map_kd" in kept:
@@ -100,13 +105,22 @@ class Materials:
         if words and all(map(_NUMBER.fullmatch, words[:3])):
             values = [float(word) for word in words[:3]]
             red, green, blue = values if len(values) == 3 else [values[0]] * 3
-            return red, green, blue
+            if min(values) >= 0 and max(values) < math.inf:
+                if max(values) > 1 + 1e-6:
+                    self._found.append(f"Kd {text!r} of the material {name!r} is over 1")
+                return red, green, blue
         self._found.append(f"Kd {text!r} of the material {name!r} ignored")
         return 1.0, 1.0, 1.0
 
-    def _share(self, text: str | None, default: float) -> float:
-        words = (text or "").removeprefix("-halo").split()
-        return float(words[0]) if words and _NUMBER.fullmatch(words[0]) else default
+    def _share(self, name: str, key: str, kept: dict[str, str]) -> float | None:
+        """Read a number from 0 to 1; None where there is none."""
+        if key not in kept:
+            return None
+        words = kept[key].removeprefix("-halo").split()
+        if words and _NUMBER.fullmatch(words[0]) and 0 <= float(words[0]) <= 1:
+            return float(words[0])
+        self._found.append(f"{key} {kept[key]!r} of the material {name!r} ignored")
+        return None
 
     def _picture(self, text: str) -> str:
         """Take the options off the name of a picture, which may hold blanks."""

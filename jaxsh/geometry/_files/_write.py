@@ -26,7 +26,7 @@ _POSITIONS_ONLY = ("hard edges", "uv", "colors", "materials")
 _FORMATS = {
     ".ply": _Format(ply_files, leaves_out=("materials",)),
     ".obj": _Format(obj_files, leaves_out=("alpha of colors", "double-sided materials")),
-    ".glb": _Format(glb_files, up="y"),
+    ".glb": _Format(glb_files, up="y", leaves_out=("colors over 1",)),
     ".stl": _Format(stl_files, leaves_out=_POSITIONS_ONLY),
     ".off": _Format(off_files, leaves_out=_POSITIONS_ONLY),
 }

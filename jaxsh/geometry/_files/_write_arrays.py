@@ -100,6 +100,8 @@ def has(arrays: Arrays, what: str) -> bool:
     match what:
         case "alpha of colors":
             return arrays.colors is not None and bool((arrays.colors[:, 3] != 1).any())
+        case "colors over 1":  # which readers must cut off
+            return arrays.colors is not None and bool((arrays.colors > 1).any())
         case "double-sided materials":
             return any(one.double_sided for one in arrays.materials)
         case "hard edges":
