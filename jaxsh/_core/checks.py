@@ -50,7 +50,7 @@ def as_integer(value: Any, name: str) -> Int[Array, "..."]:
 
 def as_path(value: Any, name: str = "path") -> Path:
     """Convert to a path; raises `TypeError` for what is none."""
-    if isinstance(value, str | os.PathLike):
+    if isinstance(value, str | os.PathLike) and value != "":
         return Path(value)
     raise TypeError(f"expected {name} as a string or a path, got {described(value)}")
 

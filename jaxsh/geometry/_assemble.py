@@ -139,6 +139,10 @@ def _knots(whole: Clean, normals: Normals):
         _, at, knots = np.unique(knots, return_index=True, return_inverse=True)
         knots = knots.reshape(-1, 3).astype(np.int32)
         vertices = vertices[whole.faces.ravel()[at]]
+    # XLA takes numbers below 1.2e-38 for zero, and a power of two rounds nothing.
+    exponent = np.frexp(np.abs(vertices).max())[1]
+    if exponent < -60:
+        vertices = np.ldexp(vertices, -exponent)
     return knots, vertex_normals(jnp.asarray(vertices), jnp.asarray(knots))
 
 

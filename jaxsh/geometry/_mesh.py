@@ -3,10 +3,11 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 from jaxtyping import Array, Float, Int
 
-from .._core.checks import as_float, as_integer
+from .._core.checks import as_float, as_integer, described
 from .._core.xla import keep_rows, rows_are_split
 from ._base_color import BaseColor
 
@@ -17,7 +18,8 @@ class Mesh(eqx.Module):
     `make_mesh` and `read_mesh` give float32 vertices and normals and int32 faces, with no
     degenerate face and no vertex that is NaN, infinite or in no face. A position stands there once
     for each normal, UV or color that it has: `neighbors` and `topology` join them. A `Mesh` built
-    by hand is taken as it is. Differentiable in vertices and normals; the faces are constants.
+    by hand is taken as it is, and raises `ValueError` where shapes or kinds of numbers do not fit.
+    Differentiable in vertices and normals; the faces are constants.
 
     **Example**
 
@@ -37,6 +39,31 @@ class Mesh(eqx.Module):
     materials: tuple[BaseColor, ...] = ()
     # Taken off the file's coordinates, in float64: those are `vertices` + `origin`.
     origin: tuple[float, float, float] = eqx.field(static=True, default=(0.0, 0.0, 0.0))
+
+    def __check_init__(self):
+        for name, kind, wanted in (
+            ("vertices", "floats", ("v", 3)),
+            ("normals", "floats", ("v", 3)),
+            ("faces", "integers", ("f", 3)),
+            ("uv", "floats", ("v", 2)),
+            ("colors", "floats", ("v", 4)),
+            ("face_material", "integers", ("f",)),
+        ):
+            array = getattr(self, name)
+            if array is None and name in ("uv", "colors", "face_material"):
+                continue
+            like = np.shape(self.vertices if wanted[0] == "v" else self.faces)
+            number = jnp.floating if kind == "floats" else jnp.integer
+            if (
+                not hasattr(array, "dtype")
+                or np.shape(array) != (*like[:1], *wanted[1:])
+                or not jnp.issubdtype(array.dtype, number)
+            ):
+                said = str(wanted).replace("'", "")
+                raise ValueError(
+                    f"expected {name} of a mesh as an array {said} of {kind}, got "
+                    f"{described(array)}"
+                )
 
 
 def vertex_normals(vertices: Float[Array, "v 3"], faces: Int[Array, "f 3"]) -> Float[Array, "v 3"]:

@@ -179,6 +179,12 @@ def neighbors(mesh: Mesh) -> Int[Array, "v n"]:
 def _joined(mesh: Mesh, faces: np.ndarray) -> np.ndarray:
     """Name for each vertex in a face the first such at its position; the others name themselves."""
     vertices = np.asarray(mesh.vertices)
+    vertices = vertices.astype(np.promote_types(vertices.dtype, np.float32))
+    if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
+        raise ValueError(
+            f"faces of the mesh name vertices {faces.min()} to {faces.max()}, but it has 0 to "
+            f"{len(vertices) - 1}"
+        )
     used = np.zeros(len(vertices), bool)
     used[faces] = True
     at = np.flatnonzero(used)

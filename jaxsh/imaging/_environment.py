@@ -205,7 +205,8 @@ def studio(height: int = 256, width: int = 512) -> Float[Array, "height width 3"
     >>> imaging.studio(8, 16).shape
     (8, 16, 3)
     """
-    if check_size("height", height, 0) < 1 or check_size("width", width, 0) < 1:
+    height, width = check_size("height", height, 0), check_size("width", width, 0)
+    if height < 1 or width < 1:
         raise ValueError(f"a picture needs pixels, got {width} × {height}")
     theta = (np.arange(height)[:, None] + 0.5) * np.pi / height
     phi = (np.arange(width) + 0.5) * 2 * np.pi / width

@@ -130,7 +130,8 @@ class SkyFit(eqx.Module):
 
     def truncated(self, degree: int) -> "SkyFit":
         """Leaves out the bands above `degree`, and the work for them."""
-        if not check_degree(degree) <= self.degree:
+        degree = check_degree(degree)
+        if degree > self.degree:
             raise ValueError(f"the fit is of degree {self.degree}, got degree {degree}")
         rows = (degree + 1) * (degree + 2) // 2
         return eqx.tree_at(lambda f: f.coefficients, self, self.coefficients[:, :rows])

@@ -69,7 +69,8 @@ def fibonacci(count: int) -> Quadrature:
     >>> round(float(quadrature.weights.sum()), 2)
     12.57
     """
-    n = np.arange(check_size("count", count))
+    count = check_size("count", count)
+    n = np.arange(count)
     golden = (1 + np.sqrt(5)) / 2
     z, phi = 1 - (2 * n + 1) / count, 2 * np.pi * n / golden
     radius = np.sqrt(1 - z**2)

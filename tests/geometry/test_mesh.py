@@ -255,6 +255,38 @@ def test_knot_needs_vertices():
         knot(299)
 
 
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        (
+            "vertices",
+            jnp.ones((4, 2)),
+            r"vertices of a mesh as an array \(v, 3\) of floats, .*4, 2",
+        ),
+        ("vertices", [[0.0, 0.0, 0.0]] * 4, r"vertices .* got a list of 4"),
+        ("normals", jnp.ones((3, 3)), r"normals .* got an array of shape \(3, 3\)"),
+        ("faces", jnp.zeros((2, 4), int), r"faces of a mesh as an array \(f, 3\) of integers"),
+        ("faces", jnp.zeros((2, 3)), "faces .* dtype float64"),
+        ("uv", jnp.ones((4, 3)), r"uv of a mesh as an array \(v, 2\)"),
+        ("colors", jnp.ones((4, 3)), r"colors of a mesh as an array \(v, 4\)"),
+        ("face_material", jnp.zeros(3, int), r"face_material of a mesh as an array \(f,\)"),
+    ],
+)
+def test_a_mesh_by_hand_must_fit(unchecked, field, value, message):
+    mesh = make_mesh(*shapes.TETRAHEDRON)
+    arrays = {"vertices": mesh.vertices, "faces": mesh.faces, "normals": mesh.normals}
+    with pytest.raises(ValueError, match=message):
+        Mesh(**arrays | {field: value})
+
+
+@pytest.mark.parametrize("normals", ["smooth", 30.0])
+def test_normals_of_a_mesh_below_the_normal_numbers_of_float32(normals):
+    vertices, faces = shapes.TETRAHEDRON
+    expected = make_mesh(vertices, faces, normals=normals).normals
+    got = make_mesh(np.asarray(vertices) * 2.0**-134, faces, normals=normals).normals
+    np.testing.assert_allclose(got, expected, atol=1e-6)
+
+
 def test_mesh_is_a_pytree():
     mesh = make_mesh(*shapes.TETRAHEDRON)
     moved = jax.jit(lambda m: Mesh(m.vertices + 1, m.faces, m.normals))(mesh)

@@ -28,6 +28,13 @@ def plainly(mesh):
     return np.array(rows, np.int32).reshape(len(beside), width)
 
 
+@pytest.mark.parametrize("face", [(0, 1, 3), (-1, 0, 1)])
+@pytest.mark.parametrize("function", [neighbors, topology])
+def test_faces_that_name_no_vertex_are_refused(function, face):
+    with pytest.raises(ValueError, match=r"faces of the mesh name vertices .*, but it has 0 to 2"):
+        function(mesh_of([face], 3))
+
+
 def fan(count, center=0, first=1):
     return [(center, first + i, first + (i + 1) % count) for i in range(count)]
 

@@ -234,6 +234,38 @@ def test_bad_meshes_are_refused(unchecked):
         bake(Mesh(mesh.vertices[:0], mesh.faces[:0], mesh.normals[:0]), 2)
 
 
+def test_hand_made_meshes_of_small_floats_are_refused(unchecked):
+    mesh = bodies.cube()
+    small = Mesh(mesh.vertices.astype(jnp.float16), mesh.faces, mesh.normals)
+    with pytest.raises(ValueError, match="expected vertices of the mesh in float32 or float64"):
+        bake(small, 2)
+
+
+@pytest.mark.parametrize("length", [1e-40, 1e-30, 1e30])
+def test_normals_may_have_any_length(length):
+    mesh = bodies.cube()
+    normals = np.asarray(mesh.normals, np.float32) * np.float32(length)
+    other = Mesh(mesh.vertices, mesh.faces, jnp.asarray(normals))
+    expected, got = (baked(m, 2, shadows=False) for m in (mesh, other))
+    atol = 1e-5 if length < 1e-38 else 3e-7  # below 1.2e-38 the normals themselves lose digits
+    np.testing.assert_allclose(got, expected, atol=atol)
+
+
+def test_doubles_on_this_thread_alone_are_doubles_on_all(recwarn):
+    """`with jax.enable_x64(True)` holds on one thread, and a bake has several."""
+    mesh = knot(300)
+    mesh = Mesh(mesh.vertices.astype(float), mesh.faces, mesh.normals.astype(float))
+    expected = baked(mesh, 2, directions=16, bounces=1)
+    jax.config.update("jax_enable_x64", False)
+    try:
+        with jax.enable_x64(True):
+            got = baked(mesh, 2, directions=16, bounces=1)
+    finally:
+        jax.config.update("jax_enable_x64", True)
+    np.testing.assert_array_equal(got, expected)
+    assert not list(recwarn)
+
+
 @pytest.mark.parametrize(("terminal", "progress"), [(True, True), (True, False), (False, True)])
 def test_the_bar_is_for_a_terminal_and_can_be_switched_off(terminal, progress, monkeypatch):
     import tqdm

@@ -91,7 +91,7 @@ def test_a_sphere_far_away_sees_everything(sphere, distance):
         np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)  # 1.3e-7 measured
 
 
-@pytest.mark.parametrize("scale", [1e-30, 1e-18, 1e18, 1e30])
+@pytest.mark.parametrize("scale", [1e-40, 1e-30, 1e-18, 1e18, 1e30])
 def test_a_sphere_of_any_size_sees_everything(sphere, scale):
     mesh = Mesh(sphere.vertices * np.float32(scale), sphere.faces, sphere.normals)
     np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)
@@ -120,6 +120,13 @@ def test_a_body_with_shadows_has_the_same_anywhere(kind):
 def test_a_sphere_in_doubles_sees_everything_anywhere(sphere):
     vertices, normals = (jnp.asarray(x, float) for x in (sphere.vertices, sphere.normals))
     mesh = Mesh(1e-3 * vertices + 1e7, sphere.faces, normals)
+    np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)
+
+
+@pytest.mark.parametrize("scale", [1e-310, 1e-200, 1e200, 4e307])
+def test_a_sphere_in_doubles_of_any_size_sees_everything(sphere, scale):
+    vertices, normals = (jnp.asarray(x, float) for x in (sphere.vertices, sphere.normals))
+    mesh = Mesh(jnp.asarray(np.asarray(vertices) * scale), sphere.faces, normals)
     np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)
 
 

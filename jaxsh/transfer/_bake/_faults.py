@@ -33,6 +33,9 @@ def check_arguments(
     check_type("mesh", mesh, Mesh)
     check_flag("shadows", shadows)
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    for name, dtype in (("vertices", vertices.dtype), ("normals", mesh.normals.dtype)):
+        if dtype not in (np.float32, np.float64):
+            raise ValueError(f"expected {name} of the mesh in float32 or float64, got {dtype}")
     if len(vertices) == 0:
         raise ValueError("the mesh has no vertices")
     if bad := int((~np.isfinite(vertices).all(axis=1)).sum()):

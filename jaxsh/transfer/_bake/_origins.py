@@ -134,7 +134,9 @@ def _edges(
 
     Without any, infinite and zero.
     """
-    points = np.ascontiguousarray(vertices.T, np.float64)
+    # By a power of two of moderate size, so that no square leaves the range of numbers.
+    exponent = np.frexp(np.abs(vertices).max())[1]
+    points = np.ldexp(np.ascontiguousarray(vertices.T, np.float64), -exponent)
     corners = [np.take(points, faces[:, corner], axis=1) for corner in range(3)]
     shortest, longest = np.full(len(faces), np.inf), np.zeros(len(faces))
     for one, two in ((0, 1), (1, 2), (2, 0)):
@@ -147,7 +149,7 @@ def _edges(
     for corner in range(3):
         np.minimum.at(least, faces[:, corner], shortest)
         np.maximum.at(most, faces[:, corner], longest)
-    return least, most
+    return np.ldexp(least, exponent), np.ldexp(most, exponent)
 
 
 def _open(faces: Int[np.ndarray, "f 3"], count: int) -> Bool[np.ndarray, " v"]:
@@ -191,5 +193,7 @@ def _inwards(
 
 
 def _unit(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    largest = np.abs(vectors).max(axis=1, keepdims=True, initial=0)
+    vectors = np.ldexp(vectors, -np.frexp(largest)[1])  # so that no square is infinite or zero
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.where(length > 0, length, 1)

@@ -7,6 +7,8 @@ from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -71,8 +73,15 @@ def progress_bar(total: int, shown: bool):
 
 def _in_order(gather: Gather, parts: list[slice]) -> Generator[tuple[slice, np.ndarray]]:
     """Yield each part with its rows. After an exception or interrupt later parts do not start."""
+    # `with jax.enable_x64(True)` holds on its own thread alone.
+    double = jnp.result_type(float) == jnp.float64
+
+    def run(part: slice) -> np.ndarray:
+        with jax.enable_x64(double):
+            return gather(part)
+
     with ThreadPoolExecutor(cores()) as pool:
-        futures = [pool.submit(gather, part) for part in parts]
+        futures = [pool.submit(run, part) for part in parts]
         try:
             for part, future in zip(parts, futures, strict=True):
                 yield part, future.result()
