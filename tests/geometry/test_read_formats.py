@@ -151,6 +151,17 @@ def test_obj_materials_and_pictures_are_those_beside_the_file(tmp_path):
         assert phrase in said
 
 
+def test_off_colors_of_faces_are_bytes_without_a_point(tmp_path):
+    text = "OFF\n4 4 0\n" + POINTS + "3 0 1 2 51 0 255 128\n3 0 2 3 0.2 0 1.\n3 1 2 3 1 0 0\n"
+    mesh, said = read(tmp_path / "a.off", text + "3 0 1 3\n", colors="linear")
+    assert said == ""
+    expected = [(0.2, 0, 1, 128 / 255), (0.2, 0, 1, 1), (1 / 255, 0, 0, 1), (1, 1, 1, 1)]
+    np.testing.assert_allclose(corners(mesh, "colors")[:, 0], expected, atol=1e-7)
+    mesh, said = read(tmp_path / "a.off", text + "3 0 1 3 2.5 0 0\n", colors="linear")
+    assert said == "colors from 0 to 2.5 taken as they are"
+    np.testing.assert_allclose(corners(mesh, "colors")[-1, 0], (2.5, 0, 0, 1), atol=1e-7)
+
+
 @pytest.mark.parametrize(
     ("lines", "factor", "phrase"),
     [

@@ -70,18 +70,29 @@ def _text(words: Words, header: re.Match | None) -> Polygons:
         found.append(f"indices into a color map at {ignored} faces ignored")
     face_colors = None
     if colored.any():
-        values = words.numbers(ranges((first + 1 + sizes)[colored], more[colored]))
         face_colors = np.full((faces, 4), np.nan)
-        face_colors[colored, 3] = 1
-        begin = np.cumsum(more[colored]) - more[colored]
-        # Bytes have an alpha of up to 255 as well.
-        face_colors[colored, :3] = values[begin[:, None] + np.arange(3)]
-        alpha = more == 4
-        face_colors[alpha, 3] = values[begin[alpha[colored]] + 3]
-        scale = 255 if np.nanmax(face_colors[:, :3]) > 1 else 1
-        face_colors[:, :3] /= scale
-        face_colors[alpha, 3] /= scale
+        at = (first + 1 + sizes)[colored]
+        face_colors[colored], phrase = _face_colors(words, at, more[colored])
+        found += [phrase] if phrase else []
     return _polygons(positions, corners, sizes, normals, uv, colors, face_colors, found)
+
+
+def _face_colors(words: Words, first: np.ndarray, counts: np.ndarray):
+    """Read three or four values for each face: bytes where they are written without a point."""
+    at = ranges(first, counts)
+    begin = np.cumsum(counts) - counts
+    values = words.numbers(at)
+    points = np.concatenate([[0], np.cumsum(words.bytes == ord("."))])
+    pointed = points[words.ends[at]] > points[words.starts[at]]
+    whole = np.repeat(~np.logical_or.reduceat(pointed, begin), counts)
+    # A file of 0 and 1 alone has no bytes.
+    if (values[whole] > 1).any():
+        values[whole] /= 255
+    colors = np.ones((len(counts), 4))
+    colors[:, :3] = values[begin[:, None] + np.arange(3)]
+    alpha = counts == 4
+    colors[alpha, 3] = values[begin[alpha] + 3]
+    return unit_colors(colors)
 
 
 def _vertices(words: Words, lines: slice, header: re.Match | None, found: list[str]):
