@@ -1,5 +1,7 @@
 """The mesh and its normals."""
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -49,15 +51,16 @@ class Mesh(eqx.Module):
             ("colors", "floats", ("v", 4)),
             ("face_material", "integers", ("f",)),
         ):
-            array = getattr(self, name)
+            array: Any = getattr(self, name)
             if array is None and name in ("uv", "colors", "face_material"):
                 continue
+            dtype = getattr(array, "dtype", None)
             like = np.shape(self.vertices if wanted[0] == "v" else self.faces)
             number = jnp.floating if kind == "floats" else jnp.integer
             if (
-                not hasattr(array, "dtype")
-                or np.shape(array) != (*like[:1], *wanted[1:])
-                or not jnp.issubdtype(array.dtype, number)
+                dtype is None
+                or getattr(array, "shape", None) != (*like[:1], *wanted[1:])
+                or not jnp.issubdtype(dtype, number)
             ):
                 said = str(wanted).replace("'", "")
                 raise ValueError(

@@ -241,6 +241,11 @@ def test_hand_made_meshes_of_small_floats_are_refused(unchecked):
         bake(small, 2)
 
 
+def test_traced_meshes_are_refused():
+    with pytest.raises(ValueError, match="known values for vertices of the mesh, got traced ones"):
+        jax.eval_shape(lambda mesh: bake(mesh, 2).coefficients, bodies.cube())
+
+
 @pytest.mark.parametrize("length", [1e-40, 1e-30, 1e30])
 def test_normals_may_have_any_length(length):
     mesh = bodies.cube()

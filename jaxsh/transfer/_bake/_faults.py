@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 
 from ..._core.checks import (
     as_host_float,
+    as_host_integer,
     check_finite,
     check_flag,
     check_number,
@@ -32,7 +33,9 @@ def check_arguments(
     """Raise `ValueError` that says which of `bake`'s arguments is wrong, and how."""
     check_type("mesh", mesh, Mesh)
     check_flag("shadows", shadows)
-    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    vertices = as_host_float(mesh.vertices, "vertices of the mesh")
+    faces = as_host_integer(mesh.faces, "faces of the mesh")
+    as_host_float(mesh.normals, "normals of the mesh")
     for name, dtype in (("vertices", vertices.dtype), ("normals", mesh.normals.dtype)):
         if dtype not in (np.float32, np.float64):
             raise ValueError(f"expected {name} of the mesh in float32 or float64, got {dtype}")
