@@ -42,6 +42,8 @@ def save(path: str | os.PathLike[str], transfer: Transfer) -> Path:
     arrays = {name: np.asarray(getattr(transfer, name)) for name in _FIELDS}
     if problem := _problem(arrays):
         raise ValueError(f"{path}: cannot be written: {problem}")
+    if path.is_dir():
+        raise IsADirectoryError(f"{path}: cannot be written: it is a folder")
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     try:

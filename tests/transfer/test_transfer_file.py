@@ -158,3 +158,10 @@ def test_doubles_become_floats_without_x64(tmp_path):
         large = rewritten(tmp_path / "b", coefficients=np.full((7, 9), 1e39))
         with pytest.raises(ValueError, match="b: damaged: 63 of 63 coefficients are NaN or inf"):
             load(large)
+
+
+def test_a_folder_is_no_file_to_write(unchecked, tmp_path):
+    with pytest.raises(IsADirectoryError, match="cannot be written: it is a folder"):
+        save(tmp_path, transfer())
+    with pytest.raises(TypeError, match="expected path as a string or a path, got ''"):
+        save("", transfer())
