@@ -52,7 +52,8 @@ def exact_light(
 ) -> Float[Array, "*batch 3 k"]:
     """Coefficients at each position without sampling: the reference of all figures.
 
-    `occluded`: whether lights hide each other, which costs twice as much for each.
+    `occluded`: whether lights hide each other, at a cost that grows with the square of
+    their number.
     """
     total = 0.0
     for number, light in enumerate(lights):

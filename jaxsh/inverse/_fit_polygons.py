@@ -2,6 +2,7 @@
 
 import functools
 import math
+import warnings
 from collections.abc import Sequence
 
 import equinox as eqx
@@ -57,7 +58,8 @@ def fit_polygons(
     the order of the guess. Its `confidence` has n = 14 numbers for each light: center, axes, size,
     radiance. Not differentiable.
 
-    A light behind which all vertices are has no slope; put guesses where they shine on the mesh.
+    A light that shines on no vertex has no slope and stays as it is. Where values are known, a
+    warning names the guesses whose plane or whose vertices' own horizons leave no light.
     From a guess too far off the solver may come to rest in another valley and call that converged:
     look at the residual, which is to be that of the noise, and at the confidence.
 
@@ -86,6 +88,7 @@ def fit_polygons(
     check_solver(tolerance, max_steps, throw)
     turn = check_flag("turn", turn)
     guesses = _guesses(start, observed.dtype)
+    _check_side(guesses, transfer, weights)
     default = max(1e-6, float(jnp.finfo(observed.dtype).eps) ** 0.5)
     recovered = _fit(
         observed,
@@ -118,6 +121,31 @@ def _guesses(start, dtype) -> Rectangle:
             )
     stacked = _stack([_stack([rectangle_of(p) for p in guess]) for guess in guesses])
     return jax.tree.map(lambda leaf: leaf.astype(dtype), stacked)
+
+
+def _check_side(guesses: Rectangle, transfer: Transfer, weights: Float[Array, " v"]) -> None:
+    """Warn, where values are known, of lights that are below the horizon of all that they face."""
+    if not all(is_concrete(a) for a in jax.tree.leaves((guesses, transfer, weights))):
+        return
+    weigh = np.asarray(weights) > 0
+    positions, normals = (
+        np.asarray(a, np.float64)[weigh] for a in (transfer.positions, transfer.normals)
+    )
+    dark = []
+    for guess, light in np.ndindex(guesses.size.shape[:2]):
+        rectangle = jax.tree.map(lambda leaf, at=(guess, light): np.asarray(leaf)[at], guesses)
+        out = np.cross(*rectangle.axes.astype(np.float64))
+        before = (positions - rectangle.center) @ out > 0
+        corners = np.asarray(rectangle.vertices, np.float64)
+        height = normals @ corners.T - np.sum(normals * positions, axis=1)[:, None]
+        if not (before & (height > 0).any(axis=1)).any():
+            dark.append(f"light {light} of guess {guess}")
+    if dark:
+        warnings.warn(
+            f"no vertex of {weigh.sum()} is lit by {', '.join(dark)}, which stays as it is: "
+            "reverse the order of its corners, or put it before the vertices",
+            stacklevel=3,
+        )
 
 
 def _stack(lights: Sequence[Rectangle]) -> Rectangle:

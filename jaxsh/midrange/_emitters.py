@@ -53,34 +53,48 @@ class Polygon(eqx.Module):
 
 def is_convex(vertices: Float[np.ndarray, "n 3"]) -> bool:
     """Tell if no corner of a simple polygon turns inwards."""
-    edges = np.roll(vertices, -1, axis=0) - vertices
-    turns = np.cross(edges, np.roll(edges, -1, axis=0)) @ area_vector(vertices)
+    corners, _ = without_unit(vertices)
+    edges = np.roll(corners, -1, axis=0) - corners
+    turns = np.cross(edges, np.roll(edges, -1, axis=0)) @ unit_normal(corners)
     return bool((turns >= 0).all())
 
 
-def area_vector(vertices: np.ndarray) -> np.ndarray:
+def unit_normal(vertices: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " 3"]:
+    """Compute the unit normal, in float64."""
+    area = _area_vector(without_unit(vertices)[0])
+    return area / np.linalg.norm(area)
+
+
+def without_unit(vertices: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "n 3"], float]:
+    """Take off the first vertex and divide by the extent, which is the second result.
+
+    So that no product of lengths leaves the range of floats, whatever the unit of length.
+    """
+    corners = vertices.astype(np.float64) - vertices[0]
+    extent = float(np.abs(corners).max())
+    return corners / (extent if extent > 0 else 1), extent
+
+
+def _area_vector(vertices: np.ndarray) -> np.ndarray:
     """Compute the area's vector, by Newell's formula."""
-    spokes = vertices - vertices[0]
-    return np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0) / 2
+    return np.cross(vertices, np.roll(vertices, -1, axis=0)).sum(axis=0) / 2
 
 
 def _check_vertices(vertices: np.ndarray) -> None:
     if not np.isfinite(vertices).all():
         raise ValueError("a polygon's vertices must be finite")
     tolerance = _FLAT.get(vertices.dtype, _FLAT[np.dtype(np.float32)])
-    corners = vertices.astype(np.float64)
-    corners = corners - corners[0]
-    extent = np.abs(corners).max()
-    area = area_vector(corners)
+    corners, extent = without_unit(vertices)
+    area = _area_vector(corners)
     size = np.linalg.norm(area)
-    if size <= tolerance * extent**2:
+    if size <= tolerance:
         raise ValueError(
-            f"a polygon must have an area, got {size:.1e} at an extent of {extent:.1e}"
+            f"a polygon must have an area, got {size:.1e} of the squared extent, {extent:.1e}²"
         )
     height = np.abs(corners @ area / size).max()
-    if height > tolerance * extent:
+    if height > tolerance:
         raise ValueError(
-            f"a polygon must be flat: a vertex is {height / extent:.1e} of the extent out of the "
+            f"a polygon must be flat: a vertex is {height:.1e} of the extent out of the "
             f"plane, more than {tolerance:.0e}; split it into triangles"
         )
     pair = _meeting_edges(np.delete(corners, np.argmax(np.abs(area)), axis=1))

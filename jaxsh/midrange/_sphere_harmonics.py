@@ -7,9 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_degree, check_type, check_vectors, is_concrete
+from .._core.checks import align, as_finite, check_degree, check_type, check_vectors, is_concrete
 from ..harmonics import degrees, evaluate, evaluate_with_gradient
 from ._emitters import Sphere
+from ._vectors import inverse_power
 
 
 def sphere_harmonics(
@@ -25,8 +26,8 @@ def sphere_harmonics(
     `point`. Differentiable in all of the sphere and in the point, forward and reverse; at the
     surface, where the sphere fills half of the sky, the slope is infinite.
 
-    Raises `ValueError` for shapes that do not fit and, where values are known, for a point inside
-    the sphere; where they are not known, such a point gives NaN.
+    Raises `ValueError` for shapes that do not fit and, where values are known, for a point that
+    is not finite or inside the sphere; where they are not known, one inside gives NaN.
 
     **Example**
 
@@ -62,13 +63,13 @@ def sphere_harmonics_with_gradient(
 
 def _light(sphere: Sphere, point, degree, gradient: bool):
     check_type("sphere", sphere, Sphere)
-    point = as_float(point, "point")
+    point = as_finite(point, "point")
     check_vectors("point", point)
     center, radius, radiance = (
         x.astype(point.dtype) for x in (sphere.center, sphere.radius, sphere.radiance)
     )
     if all(is_concrete(x) for x in (point, center, radius)):
-        distance = np.linalg.norm(np.asarray(point) - np.asarray(center), axis=-1)
+        distance = np.linalg.norm(np.asarray(point, np.float64) - np.asarray(center), axis=-1)
         inside = int((distance < np.asarray(radius)).sum())
         if inside:
             raise ValueError(f"{inside} points are inside the sphere, where it emits no light")
@@ -78,7 +79,8 @@ def _light(sphere: Sphere, point, degree, gradient: bool):
 @functools.partial(jax.jit, static_argnums=(4, 5))
 def _compiled(center, radius, radiance, point, degree: int, gradient: bool):
     center = center.reshape((1,) * (point.ndim - 1) + (3,))
-    s = center - point
+    inverse = inverse_power(radius)  # no square of a length leaves the range of floats
+    s, radius = (center - point) * inverse, radius * inverse
     squared = jnp.sum(s * s, axis=-1)
     sine = radius * radius / squared  # squared
     sine = jnp.where(sine <= 1, sine, jnp.nan)
@@ -91,7 +93,7 @@ def _compiled(center, radius, radiance, point, degree: int, gradient: bool):
     # d z/d p = -R²/(d⁴ z) s
     pull = (-sine / (squared * z))[..., None] * s
     rise = (slopes[..., l] * basis)[..., None] * pull[..., None, :]
-    change = rise - bands[..., l][..., None] * turn
+    change = (rise - bands[..., l][..., None] * turn) * inverse
     return _colored(radiance, bands[..., l] * basis, -1), _colored(radiance, change, -2)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ..geometry import Mesh
-from ._emitters import EmissiveMesh, Polygon, Sphere, area_vector
+from ._emitters import EmissiveMesh, Polygon, Sphere, unit_normal, without_unit
 
 Emitter = Polygon | Sphere | EmissiveMesh
 Blocker = Polygon | Sphere | Mesh
@@ -84,7 +84,8 @@ def _with_light(
 
 def triangulate(vertices: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, "t 3"]:
     """Indices of the n-2 triangles of a simple polygon, wound as it is: ears, cut one by one."""
-    normal = area_vector(vertices)
+    vertices, _ = without_unit(vertices)
+    normal = unit_normal(vertices)
     left, triangles = list(range(len(vertices))), []
     while len(left) > 3:
         ear = next((i for i in range(len(left)) if _is_ear(vertices[left], i, normal)), None)

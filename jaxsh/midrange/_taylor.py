@@ -185,18 +185,20 @@ def taylor_matrices(degree: int, order: int) -> Float[np.ndarray, "m k k_up"]:
 
 
 def project_cube_with_gradient(
-    cube: RadianceCube, degree: int, *, gradient: str = "surface"
+    cube: RadianceCube, degree: int, *, gradient: str = "edges"
 ) -> tuple[Float[Array, "*batch 3 k"], Float[Array, "*batch 3 k 3"]]:
     """Project a cube to coefficients (..., 3, K) and their gradient d/d point, (..., 3, K, 3).
 
     With ω a texel's direction, dω its solid angle, t the tangential gradient of y at ω:
 
+    - `"edges"`: ∇c = Σ_e (L_b - L_a) y ν (1/r)_near over the edges between texels, which is the
+      moving boundary and nothing else: right under occlusion too, the same where nothing is hidden.
     - `"surface"`: ∇c = Σ L dω [(3ωy - t)/r - y n/h], eqs. 11 to 13 of Annen et al. 2004 with their
       signs put right, and 1/r, not the 1/r² of §4.2. What is visible is taken not to change (eq. 8
       leaves out the moving boundary): right for each light by itself, wrong, at any resolution,
-      where a surface hides part of a light or one light part of another.
-    - `"edges"`: ∇c = Σ_e (L_b - L_a) y ν (1/r)_near over the edges between texels, which is the
-      moving boundary and nothing else: right under occlusion too, the same where nothing is hidden.
+      where a surface hides part of a light or one light part of another. Of 24 lights so hidden
+      at 64² and degree 4 (tests/midrange/test_edges.py) its median error is 65 % of the gradient;
+      that of `"edges"` is 2.5 %.
 
     Linear in the radiance; differentiable in all of the cube, in `"edges"` with kinks where the
     nearer of two surfaces changes. Zero from texels at infinity, and from planes seen edge on.
@@ -209,7 +211,7 @@ def project_cube_with_gradient(
     >>> corners = jnp.array([[1.0, -1, 2], [-1, -1, 2], [-1, 1, 2], [1, 1, 2]])
     >>> light = midrange.Polygon(corners, jnp.ones(3))
     >>> cube = midrange.capture(midrange.Scene([light]), jnp.zeros(3), 8, rays="analytic")
-    >>> c, gradient = midrange.project_cube_with_gradient(cube, degree=1, gradient="edges")
+    >>> c, gradient = midrange.project_cube_with_gradient(cube, degree=1)
     >>> c.shape, gradient.shape
     ((3, 4), (3, 4, 3))
     """

@@ -78,6 +78,13 @@ def inverse_length(a: Array) -> Array:
     return jnp.where(fits, jnp.sqrt(1 / jnp.where(fits, squared, 1)), 0)
 
 
+def inverse_power(length: Array) -> Array:
+    """A constant power of two close to 1/length: to change the unit of length, rounding nothing."""
+    _, exponent = jnp.frexp(jax.lax.stop_gradient(length))
+    most = jnp.finfo(length.dtype).maxexp - 2
+    return jnp.ldexp(jnp.ones_like(length), -jnp.clip(exponent, -most, most))
+
+
 def unit(a: Array) -> Array:
     """a/|a|, and zero for zero."""
     return scale(inverse_length(a), a)

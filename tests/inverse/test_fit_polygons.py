@@ -159,3 +159,18 @@ def test_fits_of_lights_refuse_mistakes(baked, unchecked):
         inverse.fit_colors(observed, baked, ALBEDO, [lamp], upper=0.0)
     with pytest.raises(ValueError, match="expected observed"):
         inverse.fit_colors(observed[:5], baked, ALBEDO, [lamp])
+
+
+def test_says_which_guesses_shine_on_no_vertex(baked):
+    """From behind, or below all horizons; before anything is fitted, as warnings are errors."""
+    observed = jnp.ones((len(baked.positions), 3))
+    turned = Polygon(PANEL.vertices[::-1], PANEL.radiance)
+    guesses = [LAMP.polygon, turned], [LAMP.polygon, PANEL.polygon], [turned, LAMP.polygon]
+    with pytest.raises(
+        UserWarning, match="is lit by light 1 of guess 0, light 0 of guess 2, which"
+    ):
+        inverse.fit_polygons(observed, baked, ALBEDO, guesses)
+    away = jnp.tile(-LAMP.center / jnp.linalg.norm(LAMP.center), (len(observed), 1))
+    away = eqx.tree_at(lambda t: t.normals, baked, away)
+    with pytest.raises(UserWarning, match="is lit by light 0 of guess 0, which"):
+        inverse.fit_polygons(observed, away, ALBEDO, [LAMP.polygon])

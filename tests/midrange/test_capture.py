@@ -95,8 +95,8 @@ def test_inside_a_closed_light_only_the_mean_is_left():
     """The furnace: radiance from all sides, so no band but l = 0 and no gradient, by both forms."""
     inwards = EmissiveMesh(BOX, WHITE, two_sided=True)
     cube = capture(Scene([inwards]), np.array([0.2, -0.3, 0.4]), 64)
-    c, surface = project_cube_with_gradient(cube, 2)
-    _, edges = project_cube_with_gradient(cube, 2, gradient="edges")
+    c, surface = project_cube_with_gradient(cube, 2, gradient="surface")
+    _, edges = project_cube_with_gradient(cube, 2)
     np.testing.assert_allclose(c[:, 0], np.sqrt(4 * np.pi), rtol=1e-12)
     # The texels' centres integrate no harmonic and no 1/r exactly, but jumps there are none.
     np.testing.assert_allclose(c[:, 1:], 0, atol=2e-4)
@@ -132,7 +132,7 @@ def test_an_environment_alone_is_its_projection(rng):
     coefficients = rng.normal(size=(3, 9))
     picture = reconstruct_lat_long(coefficients, 64, 128)
     cube = capture(Scene([], environment=picture), np.zeros(3), 64)
-    c, gradient = project_cube_with_gradient(cube, 2)
+    c, gradient = project_cube_with_gradient(cube, 2, gradient="surface")
     np.testing.assert_allclose(c, project_lat_long(picture, 2), atol=3e-3)
     np.testing.assert_array_equal(gradient, 0)
     np.testing.assert_array_equal(project_cube_with_gradient(cube, 2, gradient="edges")[1], 0)

@@ -104,7 +104,7 @@ def test_lights_that_are_partly_hidden():
 
 
 def project_both(cube):
-    c, surface = project_cube_with_gradient(cube, 4)
+    c, surface = project_cube_with_gradient(cube, 4, gradient="surface")
     return c, surface, project_cube_with_gradient(cube, 4, gradient="edges")[1]
 
 

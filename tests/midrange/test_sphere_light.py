@@ -86,3 +86,21 @@ def test_sphere_inside_and_other_mistakes(unchecked):
         Sphere(np.array([0, np.nan, 0]), 1.0, RADIANCE)
     with pytest.raises(ValueError, match="expected radiance"):
         Sphere(np.zeros(3), 1.0, np.ones(1))
+
+
+def test_any_unit_of_length():
+    """Powers of two about 1e-18 and 1e18 change no bit, in float32."""
+    center, points = np.array([1.0, -2, 2], np.float32), np.array([[0.1, 0.2, 0], [9, 5, 1]])
+    value, gradient = [], []
+    for scale in np.float32([1, 2.0**-60, 2.0**60]):
+        sphere = Sphere(scale * center, scale, RADIANCE)
+        c, slope = sphere_harmonics_with_gradient(sphere, scale * points.astype(np.float32), 1)
+        value, gradient = [*value, c], [*gradient, scale * slope]
+    for found in (value, gradient):
+        np.testing.assert_array_equal(found[1:], [found[0]] * 2)
+        assert np.abs(found[0]).min() > 5e-5
+
+
+def test_points_must_be_finite():
+    with pytest.raises(ValueError, match="point must be finite"):
+        sphere_harmonics(Sphere(np.zeros(3), 1.0, RADIANCE), np.array([np.nan, 2, 0]), 1)
