@@ -63,7 +63,7 @@ def polygon_harmonics(
     batches of `point` and `horizon` broadcast. Relative rounding error about ε/angle where the
     polygon is seen under a small angle (in radians). Right beside a lamp, down to 1e-6 of its
     size from plane, edge and corner, float32 is within 1e-5 of float64, and the gradient within
-    3e-5 of its largest component (degrees 1 to 8). Any unit of length will do.
+    5e-5 of its largest component (degrees 1 to 8). Any unit of length will do.
 
     Differentiable in vertices, radiance, point, horizon and blockers, forward and reverse. Zero
     with zero slope at points in the polygon's plane. At a point on an edge or vertex it is finite,
