@@ -106,7 +106,8 @@ def shade_glossy(
     The cosine of the transfer stays inside the integral, as in the paper, so the glossy part of a
     normalized lobe is less than the albedo times the mean of light over the lobe: for light of
     radiance 1 from everywhere and nothing in its way it is (k+1)/(k+2) of the albedo where the
-    eye looks along the normal, and about n·ω_o of it elsewhere.
+    eye looks along the normal, and about n·ω_o of it elsewhere. `Material.modified_phong` makes
+    up for that along the normal.
 
     **Returns** (..., V, 3), in the dtype of the transfer. Vertices that face away from the eye get
     the same formula's value, which nobody sees: B then points into the surface. Where the normal

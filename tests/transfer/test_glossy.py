@@ -356,3 +356,15 @@ def test_the_cosine_of_the_transfer_stays_in_the_glossy_part():
     left = shade_glossy(light, made, up, mirror, distant=True)[:, 0]
     np.testing.assert_allclose(left[0], (exponent + 1) / (exponent + 2), atol=1e-4)
     np.testing.assert_allclose(left, np.cos(angles), atol=0.035)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 4.0, np.array([3.0, 9.0])])
+def test_modified_phong_reflects_its_share_along_the_normal(exponent):
+    normals = jnp.asarray([[0.0, 0, 1], [0, 0, 1]])
+    transfer = unshadowed(jnp.zeros((2, 3)), normals, 16)
+    light = jnp.zeros((3, 17**2)).at[:, 0].set(np.sqrt(4 * np.pi))  # radiance 1
+    material = Material.modified_phong(0.0, jnp.asarray([0.3, 0.5, 1.0]), exponent)
+    seen = shade_glossy(light, transfer, jnp.asarray([0.0, 0, 1]), material, distant=True)
+    # Bands above 16 of the clamped lobe are cut: at exponent 1 that is 6e-5.
+    np.testing.assert_allclose(seen, [[0.3, 0.5, 1.0]] * 2, rtol=7e-5)
+    np.testing.assert_allclose(material.exponent, exponent)
