@@ -66,7 +66,9 @@ def test_tiles_are_exact_in_exact_directions(ball, light, dtype, tolerance):
 
 
 @pytest.mark.parametrize(
-    ("dtype", "tolerance"), [(jnp.float32, 2e-6), (jnp.float64, 1e-14)], ids=["float32", "float64"]
+    ("dtype", "tolerance"),
+    [pytest.param(jnp.float32, 2e-6, marks=pytest.mark.slow), (jnp.float64, 1e-14)],
+    ids=["float32", "float64"],
 )
 def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolerance):
     """Degree 4, 40 of its 74 directions; tile by tile by hand, for two eyes."""

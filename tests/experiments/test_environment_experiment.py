@@ -18,6 +18,7 @@ def folder(tmp_path_factory):
     return run(tmp_path_factory.mktemp("results"), "environment", *options, small=True)[0]
 
 
+@pytest.mark.slow
 def test_error_falls_with_degree(folder):
     rows = json.loads((folder / "metrics.json").read_text())
     plain = [row for row in rows if row["window"] == "none"]
@@ -28,6 +29,7 @@ def test_error_falls_with_degree(folder):
     assert all(row["reference_rounding"] < 5e-6 for row in rows)  # measured 5e-7
 
 
+@pytest.mark.slow
 def test_windows_trade_error_for_negative_light(folder):
     rows = json.loads((folder / "metrics.json").read_text())
     at = {row["window"]: row for row in rows if row["degree"] == 6}
@@ -37,6 +39,7 @@ def test_windows_trade_error_for_negative_light(folder):
     assert at["dering irradiance"]["mean_error"] < at["lanczos"]["mean_error"]
 
 
+@pytest.mark.slow
 def test_pictures_and_table(folder):
     table = (folder / "table.md").read_text()
     for picture in ("studio.png", "environments.png"):

@@ -66,6 +66,7 @@ def test_figures_1_and_9(run):
     assert_picture(folder / "knot_studio.png")
 
 
+@pytest.mark.slow
 def test_figure8(run):
     folder, rows = run("leekim2014.figure8", *ROW)
     [row] = rows

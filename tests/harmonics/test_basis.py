@@ -226,6 +226,7 @@ def test_x64_may_be_switched_off_and_on_again(rng):
         jax.config.update("jax_enable_x64", True)
 
 
+@pytest.mark.slow
 def test_degree_100_in_float32(rng):
     directions = oracles.unit_vectors(rng, 40).astype(np.float32)
     y = harmonics.evaluate(directions, 100, axis=0)

@@ -138,7 +138,7 @@ def test_second_derivatives_in_every_mode(order):
     np.testing.assert_allclose(hessian, np.swapaxes(hessian, -1, -2), 0, 1e-12)
 
 
-@pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
+@pytest.mark.parametrize("mode", [jax.jacfwd, pytest.param(jax.jacrev, marks=pytest.mark.slow)])
 def test_derivative_of_the_analytic_gradient_is_the_hessian(mode):
     hessian = jax.jit(jax.vmap(mode(gradient_of(4))))(POINTS)
     expected = hessians(POINTS, 4)
@@ -156,6 +156,7 @@ def test_laplacian_on_the_sphere():
     np.testing.assert_allclose(np.trace(hessian, axis1=-2, axis2=-1), expected, 0, error)
 
 
+@pytest.mark.slow
 def test_third_derivative_at_the_pole():
     def f(s):
         return harmonics.evaluate(s, 4)

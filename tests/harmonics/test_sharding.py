@@ -82,6 +82,7 @@ def test_a_large_product_is_one_call(rng):
     check_sharded(harmonics.product, (f, g), (SECOND, ROWS), SECOND)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(2, COUNT, 4), pytest.param((COUNT, 4), marks=pytest.mark.slow)])
 def test_dering_and_its_gradient(shape, rng):
     def everything(c):

@@ -123,7 +123,14 @@ def lights(rng, degree, count=8):
     return np.concatenate([impulse(), impulse() + 10 * impulse(), noise])
 
 
-@pytest.mark.parametrize(("degree", "dtype"), [(3, "float64"), (6, "float32"), (10, "float64")])
+@pytest.mark.parametrize(
+    ("degree", "dtype"),
+    [
+        (3, "float64"),
+        (6, "float32"),
+        pytest.param(10, "float64", marks=pytest.mark.slow),
+    ],
+)
 def test_dering_leaves_nothing_negative(degree, dtype, rng):
     """Between the directions that it looks at, at most a thousandth of the mean."""
     c = lights(rng, degree).astype(dtype)

@@ -66,6 +66,7 @@ def test_recovers_sun_and_turbidity(baked, fit, elevation, azimuth, turbidity):
     assert found.statistics.agreeing >= (2 if elevation == 89.9 else 12)
 
 
+@pytest.mark.slow
 def test_noise_does_what_the_confidence_says(baked, fit, rng):
     """1 % of the mean: errors of twenty draws beside the deviations that each fit gives."""
     sun, turbidity = direction(40, 70), 4.0

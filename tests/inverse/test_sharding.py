@@ -80,6 +80,7 @@ def test_colors(kind, lit):
     check(fit, kind, jnp.stack([p.radiance for p in lights]), seen(lit, lights), lit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_polygons(kind, lit):
     start = [lamp(-0.8, [1.0, 1.0, 1.0])]

@@ -73,6 +73,7 @@ def test_extrapolation_of_pairs(rng):
         np.testing.assert_allclose(found[i, j], slow_polynomial(one, x[i, 0]), atol=1e-13)
 
 
+@pytest.mark.slow
 def test_extrapolation_error_falls_with_its_order():
     step = np.array([0.03, -0.02, 0.01])
     errors, third = [], expand(np.zeros((1, 3)), 2, 3)

@@ -40,7 +40,11 @@ def test_one_sample_shades_like_its_extrapolation(rng, count, dtype):
 
 @pytest.mark.parametrize(
     ("order", "rule"),
-    [pytest.param(1, "none", marks=pytest.mark.slow), (1, "full"), (2, "half")],
+    [
+        pytest.param(1, "none", marks=pytest.mark.slow),
+        pytest.param(1, "full", marks=pytest.mark.slow),
+        (2, "half"),
+    ],
 )
 def test_samples_shade_like_their_blend(rng, order, rule):
     transfer = random_transfer(rng, 150, 1)

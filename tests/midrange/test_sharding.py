@@ -28,6 +28,7 @@ def expansions(rng):
     return midrange.Expansion(rng.normal(size=(5, 3)), rng.normal(size=(5, 3, 4, 4)))
 
 
+@pytest.mark.slow
 def test_polygon_lights_above_a_horizon_behind_a_blocker(points):
     def light(points):
         return midrange.polygon_harmonics_with_gradient(
@@ -55,6 +56,7 @@ def test_sphere_lights(points):
     check_sharded(light, (points,), (ROWS,), ROWS)
 
 
+@pytest.mark.slow
 def test_analytic_cubes_and_their_derivatives(points):
     scene = midrange.Scene([LIGHT], [BLOCKER])
 

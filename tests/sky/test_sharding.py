@@ -39,6 +39,7 @@ def test_radiance(sky_of, hosek_tables):
     check_sharded(lambda s, t: sky.sun_harmonics(s, t, 2), (sun, turbidity), (ROWS,) * 2, ROWS)
 
 
+@pytest.mark.slow
 def test_many_views_of_one_sky(sky_of):
     view, sun, turbidity = sky_of
     gradient = jax.grad(lambda v, s, t: sky.preetham_radiance(v, s, t).sum())
@@ -46,6 +47,7 @@ def test_many_views_of_one_sky(sky_of):
     check_sharded(gradient, (view, sun[0], turbidity[0]), specs, ROWS)
 
 
+@pytest.mark.slow
 def test_stored_fits(sky_of):
     _, *suns = sky_of
     window = lambda s, t: sky.preetham_harmonics(s, t, 2, window="hann")  # noqa: E731
@@ -81,7 +83,8 @@ def test_batches_of_two_axes(sky_of):
 
 
 @pytest.mark.parametrize(
-    "reading", ["luminance", "channel", pytest.param("harmonics", marks=pytest.mark.slow)]
+    "reading",
+    ["luminance", *(pytest.param(r, marks=pytest.mark.slow) for r in ("channel", "harmonics"))],
 )
 def test_smallest_luminance(sky_of, reading):
     _, *suns = sky_of

@@ -145,6 +145,7 @@ def test_spaces_and_constants_reach_the_model(space):
     assert relative_error(found, sky.project(model, sun, 3.0, degree=2)) < 1e-14
 
 
+@pytest.mark.slow
 def test_derivatives_forward_reverse_and_by_differences(rng):
     """High, on the azimuth 0 where the coefficients with m < 0 are zero, and low."""
     sun = jnp.asarray(sun_at(np.array([50.0, 20.0, 2.0]), np.array([33.0, 0.0, -100.0])))

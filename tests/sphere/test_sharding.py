@@ -77,6 +77,7 @@ def test_irradiance_of_a_shared_light(rng):
     check_sharded(sphere.irradiance, (arguments[0], grid), (WHOLE, SECOND), SECOND)
 
 
+@pytest.mark.slow
 def test_irradiance_of_a_light_for_each_normal(rng):
     def everything(lights, normals):
         loss = lambda *arguments: jnp.sum(sphere.irradiance(*arguments) ** 2)  # noqa: E731

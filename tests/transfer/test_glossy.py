@@ -267,6 +267,7 @@ def test_nodes_integrate_products_of_three(rng, degree):
     )
 
 
+@pytest.mark.slow
 def test_beyond_lebedev_s_rules_there_is_another():
     nodes = product_nodes(44)
     gram = nodes.project @ nodes.basis

@@ -111,6 +111,7 @@ def test_glossy_shading(frame, rng):
     check_sharded(shade_glossy, (own, made, eye, material), (ROWS, ROWS, WHOLE, ROWS), ROWS)
 
 
+@pytest.mark.slow
 def test_its_gradient_in_the_normals(frame):
     def slope(normals, light, made, eye, material):
         def loss(normals):
