@@ -20,7 +20,7 @@ SCIPY_ERROR = {
     2: (1e-15, 3e-7),
     6: (1.2e-14, 3e-6),
     13: (3e-14, 1.2e-5),
-    20: (1.2e-13, 3e-5),  # asked for: 1e-12
+    20: (1.2e-13, 3.6e-5),  # asked for: 1e-12; 3.3e-5 unoptimized, by JAX 0.12
     30: (2.5e-13, 7e-5),  # asked for in float32: 2e-4
 }
 
