@@ -33,6 +33,15 @@ def save(path, pixels, names=None, kind="float", **attributes):
     return path
 
 
+def save_parts(path, parts):
+    out = oiio.ImageOutput.create(path)
+    assert out.open(path, tuple(spec for _, spec in parts))
+    for i, (pixels, spec) in enumerate(parts):
+        assert i == 0 or out.open(path, spec, "AppendSubimage")
+        assert out.write_image(np.ascontiguousarray(pixels))
+    assert out.close()
+
+
 @pytest.fixture
 def picture(rng):
     return rng.uniform(0.1, 4, size=(8, 16, 3)).astype(np.float32)
@@ -136,12 +145,7 @@ def test_the_first_part_with_colors_is_read(tmp_path, picture):
         (picture, spec_of(picture, oiio__subimagename="rgba")),
         (2 * picture, spec_of(picture, oiio__subimagename="glow")),
     ]
-    out = oiio.ImageOutput.create(path)
-    assert out.open(path, tuple(spec for _, spec in parts))
-    for i, (pixels, spec) in enumerate(parts):
-        assert i == 0 or out.open(path, spec, "AppendSubimage")
-        assert out.write_image(np.ascontiguousarray(pixels))
-    assert out.close()
+    save_parts(path, parts)
     np.testing.assert_array_equal(read_environment(path), picture)
     np.testing.assert_array_equal(read_environment(path, layer="glow"), 2 * picture)
 
@@ -215,6 +219,21 @@ def test_counts_are_read_as_numbers(tmp_path, rng):
     np.testing.assert_array_equal(read_environment(path), counts)
     mixed = {"R": counts[..., 0], "G": counts[..., 1].astype(np.float32), "B": counts[..., 2]}
     np.testing.assert_array_equal(read_environment(by_hand(path, mixed)), counts)
+
+
+def test_counts_of_a_later_part(tmp_path, rng):
+    path, counts = str(tmp_path / "a.exr"), rng.integers(1, 1000, size=(2, 8, 16, 3))
+    pixels = counts.astype(np.uint32)
+    names = ("one", "two")
+    save_parts(
+        path,
+        [
+            (part, spec_of(part, kind="uint", oiio__subimagename=name))
+            for part, name in zip(pixels, names, strict=True)
+        ],
+    )
+    for part, name in zip(pixels, names, strict=True):
+        np.testing.assert_array_equal(read_environment(path, layer=name), part)
 
 
 def test_primaries_are_converted_to_rec709(tmp_path, picture):

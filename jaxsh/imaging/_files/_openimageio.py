@@ -72,7 +72,7 @@ def read_display(path: Path, encoding: str | None) -> Picture:
         spec = source.spec()
         _check_size(spec, path)
         channels = choose([(list(spec.channelnames), "")], None).channels
-        pixels = _read(source, min(channels), max(channels) + 1, spec.format)
+        pixels = _read(source, 0, min(channels), max(channels) + 1, spec.format)
     finally:
         source.close()
     pixels = pixels[..., [c - min(channels) for c in channels]]
@@ -132,25 +132,22 @@ def _name(spec: Any) -> str:
 def _exr_channels(source: Any, spec: Any, choice: Choice) -> Float[np.ndarray, "h w c"]:
     import OpenImageIO as oiio
 
-    source.seek_subimage(choice.part, 0)
     first, last = min(choice.channels), max(choice.channels) + 1
     formats = list(spec.channelformats) or [spec.format] * spec.nchannels
     if any(formats[c].basetype == oiio.UINT for c in choice.channels):
         # Counts: as floats OpenImageIO would take them for shares of the largest.
-        planes = [
-            _read(source, c, c + 1, oiio.UINT if formats[c].basetype == oiio.UINT else oiio.FLOAT)
-            for c in choice.channels
-        ]
-        return np.concatenate([plane.astype(np.float32) for plane in planes], axis=-1)
-    pixels = _read(source, first, last, oiio.FLOAT, choice.part)
+        planes = []
+        for c in choice.channels:
+            kind = oiio.UINT if formats[c].basetype == oiio.UINT else oiio.FLOAT
+            planes.append(_read(source, choice.part, c, c + 1, kind).astype(np.float32))
+        return np.concatenate(planes, axis=-1)
+    pixels = _read(source, choice.part, first, last, oiio.FLOAT)
     places = [c - first for c in choice.channels]
     return pixels if places == list(range(pixels.shape[-1])) else pixels[..., places]
 
 
-def _read(
-    source: Any, first: int, last: int, kind: Any, part: int = 0
-) -> Shaped[np.ndarray, "h w c"]:
-    """Decode some channels. OpenImageIO may stop halfway and report it later."""
+def _read(source: Any, part: int, first: int, last: int, kind: Any) -> Shaped[np.ndarray, "h w c"]:
+    """Decode some channels of a part. OpenImageIO may stop halfway and report it later."""
     pixels = source.read_image(part, 0, first, last, kind)
     problem = reason(source.geterror())
     if pixels is None or problem:
