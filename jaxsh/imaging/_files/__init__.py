@@ -4,16 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ._color import ENCODINGS, check_encoding, decoded
+from ._color import check_encoding, decoded
 from ._openimageio import Picture, read_display, read_exr, refuse_encoding
-from ._radiance import aligned, read_radiance
+from ._radiance import read_radiance
 from ._raw import read_npy, read_pfm
 
 __all__ = [
-    "ENCODINGS",
     "FORMATS",
     "Picture",
-    "aligned",
     "check_encoding",
     "decoded",
     "read_picture",

@@ -1,4 +1,10 @@
-"""Radiance pictures (.hdr, .pic): headers of every age, all orders of pixels, RGB or XYZ."""
+"""Radiance pictures (.hdr, .pic): headers of every age, all orders of pixels, RGB or XYZ.
+
+OpenImageIO (3.2) refuses old runs, XYZ and headers without FORMAT, misreads rows each coded in its
+own way, takes no notice of rows after the last, and has no wheels for some machines: so the decoder
+is our own. OpenImageIO's, four times as fast on 2048 × 1024 pixels, takes the large pictures that
+it reads to the same.
+"""
 
 import re
 from pathlib import Path
@@ -15,7 +21,7 @@ _MAX_HEADER = 1 << 20
 _MAX_PIXELS = 1 << 28  # 3 GB of them
 # What twelve bytes can repeat at most in a row of 32767 pixels, the old way.
 _MAX_PIXELS_PER_BYTE = 4096
-# Pictures of more pixels are left to OpenImageIO, where it can read them.
+# Pictures of more pixels are left to OpenImageIO, where it reads them to the same.
 _LARGE = 1 << 20
 # Primaries nearer to Rec. 709's than this are taken for them: Radiance's own are 0.01 away.
 _NEAR = 0.02
@@ -107,7 +113,11 @@ def _floats(rgbe: UInt8[np.ndarray, "h 4 w"]) -> Float[np.ndarray, "h w 3"]:
 def _check_end(data: bytes, end: int, header: _Header) -> None:
     rest, marker = len(data) - end, row_marker(header.columns)
     if marker and data.startswith(marker, end):
-        more = decodes(data, end, header.columns)
+        try:
+            decode_rows(data, end, 1, header.columns)
+            more = True
+        except ValueError:  # a mark, and no row
+            more = False
     else:
         # Uncoded rows have no mark: what is as long as some of them and not all zero is them.
         more = rest > 0 and rest % (4 * header.columns) == 0 and any(data[end:])
@@ -116,15 +126,6 @@ def _check_end(data: bytes, end: int, header: _Header) -> None:
             f"damaged: {header.columns} × {header.rows} pixels end at byte {end} of {len(data)}, "
             "and more rows follow"
         )
-
-
-def decodes(data: bytes, place: int, width: int) -> bool:
-    """True where another whole row stands at this place."""
-    try:
-        decode_rows(data, place, 1, width)
-    except ValueError:
-        return False
-    return True
 
 
 def _by_openimageio(path: Path, data: bytes, header: _Header) -> np.ndarray | None:
@@ -148,7 +149,7 @@ def _by_openimageio(path: Path, data: bytes, header: _Header) -> np.ndarray | No
         if (source.spec().height, source.spec().width) != (header.rows, header.columns):
             return None
         # Aligned, JAX takes the memory as it is.
-        pixels = aligned((header.rows, header.columns, 3))
+        pixels = _aligned((header.rows, header.columns, 3))
         for row in range(0, header.rows, 64):
             end = min(row + 64, header.rows)
             block = source.read_scanlines(row, end, 0, 0, 3, oiio.FLOAT)
@@ -161,7 +162,7 @@ def _by_openimageio(path: Path, data: bytes, header: _Header) -> np.ndarray | No
         source.close()
 
 
-def aligned(shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
+def _aligned(shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
     """Allocate float32 at a multiple of 64 bytes."""
     size = int(np.prod(shape))
     raw = np.empty(size + 16, np.float32)
