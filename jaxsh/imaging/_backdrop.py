@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._core.checks import check_type
 from .._core.pictures import as_picture, as_radiance, check_values
 from .._core.xla import keep_rows, rounded_once
 from ._camera import Camera
@@ -59,8 +60,7 @@ def backdrop(environment: Float[Array, "height width c"], camera: Camera) -> Flo
     >>> imaging.backdrop(imaging.studio(16, 32), camera).shape
     (4, 6, 3)
     """
-    if not isinstance(camera, Camera):
-        raise TypeError(f"expected camera as a Camera, got {type(camera).__name__}")
+    check_type("camera", camera, Camera)
     environment = as_picture("environment", environment, lat_long=True)
     check_values("environment", environment)
     return _backdrop(environment, camera)

@@ -148,5 +148,5 @@ def test_other_shapes_are_refused(unchecked):
     assert jnp.isnan(jax.jit(look_up)(spoilt, jnp.asarray(painters.jaxsh_lat_long(4)))).any()
     with pytest.raises(ValueError, match=r"expected directions \(..., 3\).* got shape \(3, 5\)"):
         look_up(jnp.ones((4, 8, 3)), jnp.ones((3, 5)))
-    with pytest.raises(TypeError, match="expected camera as a Camera, got tuple"):
+    with pytest.raises(TypeError, match="expected camera as a Camera, got a tuple of 3"):
         backdrop(jnp.ones((4, 8, 3)), (0, 0, 0))

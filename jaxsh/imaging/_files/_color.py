@@ -8,7 +8,7 @@ from ..._core import srgb
 # x, y of red, green, blue and white (D65).
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
-ENCODINGS = ("srgb", "linear")
+_ENCODINGS = ("srgb", "linear")
 
 
 def to_rec709(chromaticities: tuple[float, ...]) -> Float[np.ndarray, "3 3"]:
@@ -59,17 +59,15 @@ def from_luminance_chroma(
     return np.stack([r, g, b], axis=-1)
 
 
-def decoded(
-    pixels: UInt[np.ndarray, "..."], encoding: str | None, *, name: str = "the picture"
-) -> Float[np.ndarray, "..."]:
+def decoded(pixels: UInt[np.ndarray, "..."], encoding: str | None) -> Float[np.ndarray, "..."]:
     """Decode 8 or 16 bits to linear light in [0, 1], float32, as `encoding` says.
 
     Raises `ValueError` where no encoding is given, or one that is not known.
     """
     if encoding is None:
         raise ValueError(
-            f"{name} holds integers ({pixels.dtype}), which are no radiance until decoded: say "
-            'encoding="srgb" (or "linear", where they are proportional to light)'
+            f"the picture holds integers ({pixels.dtype}), which are no radiance until decoded: "
+            'say encoding="srgb" (or "linear", where they are proportional to light)'
         )
     most = np.iinfo(pixels.dtype).max
     signal = np.arange(most + 1) / most
@@ -80,5 +78,5 @@ def decoded(
 
 def check_encoding(encoding: str | None) -> None:
     """Refuse an encoding that is not known."""
-    if encoding is not None and encoding not in ENCODINGS:
-        raise ValueError(f"encoding must be one of {ENCODINGS} or None, got {encoding!r}")
+    if encoding is not None and encoding not in _ENCODINGS:
+        raise ValueError(f"encoding must be one of {_ENCODINGS} or None, got {encoding!r}")
