@@ -14,15 +14,13 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-os.environ.setdefault("JAX_PLATFORMS", "cpu")
-ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "geometry")]
+import fuzz_work
+from fuzz_files import FORMATS
+from fuzz_peers import missing
+from fuzz_work import COMPARING, READING, made, work
+from tqdm import tqdm
 
-import fuzz_work  # noqa: E402
-from fuzz_files import FORMATS  # noqa: E402
-from fuzz_peers import missing  # noqa: E402
-from fuzz_work import COMPARING, READING, made, work  # noqa: E402
-from tqdm import tqdm  # noqa: E402
+ROOT = Path(__file__).parents[2]
 
 
 class Run:
@@ -122,6 +120,9 @@ def main() -> None:
     parser.add_argument("--of-a-kind", type=int, default=3, help="faults of a kind to print")
     parser.add_argument("--out", type=Path, default=ROOT / "results" / "fuzz")
     options = parser.parse_args()
+    # For the processes that read: those start with this path and this environment.
+    sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "geometry")]
+    os.environ.setdefault("JAX_PLATFORMS", "cpu")
     faults = 0
     for kind in options.formats:
         for name in [] if options.without_peers else missing(kind):
