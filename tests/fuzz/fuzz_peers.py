@@ -11,7 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from fuzz_files import CODES, MESHES, PICTURES
+from fuzz_files import MESHES, PICTURES
+from fuzz_pictures import CODES
 
 Summary = np.ndarray
 

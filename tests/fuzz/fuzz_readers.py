@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from fuzz_files import CODES, MESHES, PICTURES
+from fuzz_files import MESHES, PICTURES
+from fuzz_pictures import CODES
 
 from jaxsh import geometry, imaging, transfer
 from jaxsh.geometry import _assemble

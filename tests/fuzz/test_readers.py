@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fuzz_changes import change
-from fuzz_files import CODES, FORMATS, MESHES, PICTURES, picture, put_beside, seeds
+from fuzz_files import FORMATS, MESHES, PICTURES, put_beside, seeds
 from fuzz_peers import summary
+from fuzz_pictures import CODES, picture
 from fuzz_readers import check, without_compiling
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
