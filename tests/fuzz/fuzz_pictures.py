@@ -56,6 +56,7 @@ def _exr() -> list[bytes]:
             path = str(Path(folder) / "a.exr")
             spec = oiio.ImageSpec(WIDTH, HEIGHT, 3, kind)
             spec.attribute("compression", compression)
+            spec.attribute("DateTime", "2020:02:20 20:20:20")  # or it is that of writing
             if tile:
                 spec.tile_width = spec.tile_height = tile
             out = oiio.ImageOutput.create(path)
