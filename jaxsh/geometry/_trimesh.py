@@ -8,7 +8,7 @@ from .._core import srgb
 from .._core.checks import check_flag, check_type
 from ._assemble import Origin, assemble, check_options
 from ._base_color import BaseColor
-from ._files._gltf_pictures import as_rgba
+from ._files._pictures import as_rgba
 from ._files._polygons import Polygons
 from ._files._write_arrays import on_host, problem
 from ._mesh import Mesh

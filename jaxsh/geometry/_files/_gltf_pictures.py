@@ -1,7 +1,4 @@
-"""Decode the pictures of a glTF file with Pillow."""
-
-import io
-import warnings
+"""Find the pictures that the textures of a glTF file name."""
 
 import numpy as np
 from jaxtyping import UInt8
@@ -10,6 +7,7 @@ from ..._core.words import reason
 from ._gltf_accessors import view_bytes
 from ._gltf_container import Document
 from ._gltf_json import Fields, extension, text, whole
+from ._pictures import Decoder
 
 _FORMATS = ("PNG", "JPEG", "WEBP")
 # Other places where a texture may name its picture, and whether that is decoded here.
@@ -19,7 +17,6 @@ _EXTENSIONS = {
     "EXT_texture_avif": False,
     "MSFT_texture_dds": False,
 }
-_ROWS = 256
 
 
 class Pictures:
@@ -31,7 +28,7 @@ class Pictures:
     def __init__(self, document: Document):
         self._document = document
         self._read: dict[int | str, UInt8[np.ndarray, "h w 4"] | None] = {}
-        self._pixels = 0
+        self._decoder = Decoder(_FORMATS)
         self._unread: list[str] = []
 
     def note_unread(self) -> None:
@@ -73,41 +70,12 @@ class Pictures:
         return self._read[key]
 
     def _decode(self, data: bytes, owner: str) -> UInt8[np.ndarray, "h w 4"]:
-        from PIL import Image, UnidentifiedImageError
+        from PIL import UnidentifiedImageError
 
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of large pictures: their size is checked here
-                image = Image.open(io.BytesIO(data), formats=_FORMATS)
-                self._check_size(image.size, len(data))
-                image.load()
-                return as_rgba(image)
+            return self._decoder.decode(data, self._document.size)
         except UnidentifiedImageError:
             kind = "KTX2" if data[1:7] == b"KTX 20" else "neither PNG, JPEG nor WebP"
             raise ValueError(f"{owner} cannot be decoded: it is {kind}") from None
         except Exception as error:  # decoders may raise anything where a picture is damaged
             raise ValueError(f"{owner} cannot be decoded: {reason(error)}") from None
-
-    def _check_size(self, size: tuple[int, int], stored: int) -> None:
-        # A byte seldom gives more than ten pixels; more are for plain pictures of moderate size.
-        self._pixels += size[0] * size[1]
-        if self._pixels > 22_000_000 + 16 * (stored + self._document.size):
-            raise ValueError(
-                f"{size[0]} × {size[1]} pixels are out of proportion to {stored} bytes"
-            )
-
-
-def as_rgba(image) -> UInt8[np.ndarray, "h w 4"]:
-    """Convert to 8-bit RGBA, some rows at a time to need little memory."""
-    width, height = image.size
-    pixels = np.empty((height, width, 4), np.uint8)
-    for top in range(0, height, _ROWS):
-        rows = image.crop((0, top, width, min(top + _ROWS, height)))
-        if rows.mode.startswith("I"):  # 16-bit gray, which Pillow would clip
-            gray = (np.asarray(rows).astype(np.uint32) + 128) // 257
-            pixels[top : top + _ROWS] = np.stack([gray] * 3 + [np.full_like(gray, 255)], axis=2)
-        else:
-            if rows.mode == "CMYK":
-                rows = rows.convert("RGB")
-            pixels[top : top + _ROWS] = np.asarray(rows.convert("RGBA"))
-    return pixels
