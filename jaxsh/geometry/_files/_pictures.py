@@ -60,6 +60,16 @@ def as_rgba(image) -> UInt8[np.ndarray, "h w 4"]:
     return pixels
 
 
+def png(picture: UInt8[np.ndarray, "h w 4"]) -> bytes:
+    """Give the bytes of an 8-bit PNG, without alpha where that is 255 throughout."""
+    from PIL import Image
+
+    opaque = (picture[..., 3] == 255).all()
+    out = io.BytesIO()
+    Image.fromarray(picture[..., :3] if opaque else picture).save(out, "PNG")
+    return out.getvalue()
+
+
 def beside(path: Path, name: str) -> Path | None:
     """Find a file that another names: by its relative path, else by its last part alone."""
     named = PurePosixPath(name.strip().strip('"').replace("\\", "/"))

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from .._base_color import BaseColor
+from ._pictures import png
 from ._write_arrays import Arrays
-from ._write_png import png
 
 _FLOAT, _UINT32 = 5126, 5125
 _ARRAY, _ELEMENTS = 34962, 34963  # what a part of the buffer is for

@@ -6,8 +6,8 @@ import numpy as np
 
 from ..._core import srgb
 from .._base_color import BaseColor
+from ._pictures import png
 from ._write_arrays import Arrays, digits, rows_of_text
-from ._write_png import png
 
 
 def obj_files(arrays: Arrays, stem: str) -> dict[str, bytes]:
