@@ -25,18 +25,17 @@ def decode_draco(
     if packed is None:
         return {}, None
     position = document.item("accessors", whole(attributes, "POSITION", owner), owner)
-    try:
-        import DracoPy  # noqa: F401, used in `_decode`
-    except ImportError:
-        if position.get("bufferView") is not None:
-            return {}, None
-        raise ValueError(
-            f"{owner} is compressed by {_NAME}, which needs the package DracoPy "
-            "(pip install jaxsh[draco])"
-        ) from None
     number = whole(packed, "bufferView", owner)
     if number not in document.meshes:
-        document.meshes[number] = _decode(document, number, owner)
+        try:
+            document.meshes[number] = _decode(document, number, owner)
+        except ImportError:
+            if position.get("bufferView") is not None:
+                return {}, None
+            raise ValueError(
+                f"{owner} is compressed by {_NAME}, which needs the package DracoPy "
+                "(pip install jaxsh[draco])"
+            ) from None
     mesh, corners, found = document.meshes[number]
     announced = whole(position, "count", owner)
     if found != announced or corners.max(initial=0) >= found:

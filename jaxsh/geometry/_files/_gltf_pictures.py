@@ -20,7 +20,7 @@ _EXTENSIONS = {
 
 
 class Pictures:
-    """Decodes the pictures that textures name, each once, as 8-bit RGBA.
+    """Reads the pictures that textures name, each once, as 8-bit RGBA.
 
     A picture that cannot be read is no reason to refuse the shape: `note_unread` says so.
     """
