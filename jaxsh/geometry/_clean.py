@@ -4,11 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._indices import first_of_equals, first_of_keys
+
 # Faces whose corners are held in float64 at a time: all at once they take more than the file.
 _BLOCK = 1 << 16
-
-# Faces that are looked at together: their corners in float64 take memory.
-_BLOCK = 2**16
 
 
 class Clean(NamedTuple):
@@ -80,52 +79,6 @@ def clean(
     return Clean(vertices[used], renumber[faces], rows, backs, found)
 
 
-def check_arrays(vertices: np.ndarray, faces: np.ndarray) -> None:
-    """Raise `ValueError` where raw arrays have not the shapes and types of a mesh."""
-    if vertices.ndim != 2 or vertices.shape[1] != 3:
-        raise ValueError(f"vertices must have shape (v, 3), got {vertices.shape}")
-    if faces.ndim != 2 or faces.shape[1] != 3:
-        raise ValueError(f"faces must have shape (f, 3), got {faces.shape}")
-    if len(faces) == 0:
-        raise ValueError("it holds no faces")
-    if not np.issubdtype(faces.dtype, np.integer):
-        raise ValueError(f"faces must be whole numbers, got {faces.dtype}")
-    wrong = (faces < 0) | (faces >= len(vertices))
-    if wrong.any():
-        row = int(wrong.any(axis=1).argmax())
-        raise ValueError(
-            f"face {row} is {faces[row].tolist()}, but vertices are 0 to {len(vertices) - 1}"
-        )
-
-
-def first_of_equals(rows: np.ndarray) -> np.ndarray:
-    """Give for each row of floats the index of the first one with the same bits."""
-    bits = np.ascontiguousarray(rows).view(np.uint32)
-    # Rows that are equal have one hash, and are found by sorting that alone.
-    key = np.zeros(len(bits), np.uint64)
-    for column in bits.T:
-        key ^= column
-        key *= np.uint64(0x9E3779B97F4A7C15)
-        key ^= key >> np.uint64(29)
-    first = _first(key)
-    if any(
-        (column[first] != column).any() for column in bits.T
-    ):  # two rows with one hash: sort all columns
-        _, at, group = np.unique(bits, axis=0, return_index=True, return_inverse=True)
-        first = at[group.reshape(-1)]
-    return first.astype(np.int32)
-
-
-def _first(keys: np.ndarray) -> np.ndarray:
-    """Give for each key the index of the first equal one."""
-    order = np.argsort(keys, kind="stable")
-    ordered = keys[order]
-    begins = np.flatnonzero(np.diff(ordered, prepend=~ordered[:1]) != 0)
-    first = np.empty(len(keys), np.int64)
-    first[order] = np.repeat(order[begins], np.diff(begins, append=len(keys)))
-    return first
-
-
 def _repeats(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tell which faces repeat an earlier one the same way round, and which run the other way."""
     low, middle, high = np.sort(faces, axis=1).astype(np.uint32).T
@@ -133,15 +86,15 @@ def _repeats(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     # Three indices as one number, or two where three do not fit.
     key = low * count + middle
     if int(count) ** 3 >= 2**64:
-        key = _first(key).astype(np.uint64)
-    first = _first(key * count + high)
+        key = first_of_keys(key).astype(np.uint64)
+    first = first_of_keys(key * count + high)
     # Even permutations of the sorted corners run one way, odd ones the other.
     a, b, c = faces.T
     odd = (a > b) ^ (b > c) ^ (a > c)
     backs = odd != odd[first]
     repeated = ~backs & (first != np.arange(len(faces)))
     later = np.flatnonzero(backs)
-    repeated[later] = _first(first[later].astype(np.uint64)) != np.arange(len(later))
+    repeated[later] = first_of_keys(first[later].astype(np.uint64)) != np.arange(len(later))
     return repeated, backs
 
 

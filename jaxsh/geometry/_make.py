@@ -5,7 +5,6 @@ from jaxtyping import Array, Float, Int
 
 from .._core.checks import as_host_float, as_host_integer, check_flag
 from ._assemble import Normals, Origin, assemble, check_options
-from ._clean import check_arrays
 from ._files._polygons import Polygons
 from ._mesh import Mesh
 
@@ -49,7 +48,7 @@ def make_mesh(
         raise ValueError('normals of arrays are "smooth" or an angle in degrees, got "file"')
     vertices, faces = as_host_float(vertices, "vertices"), as_host_integer(faces, "faces")
     try:
-        check_arrays(vertices, faces)
+        _check_arrays(vertices, faces)
     except ValueError as error:
         raise ValueError(f"mesh: {error}") from None
     polygons = Polygons(
@@ -65,3 +64,21 @@ def make_mesh(
         origin=origin,
         two_sided=two_sided,
     )
+
+
+def _check_arrays(vertices: np.ndarray, faces: np.ndarray) -> None:
+    """Raise `ValueError` where raw arrays have not the shapes and types of a mesh."""
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise ValueError(f"vertices must have shape (v, 3), got {vertices.shape}")
+    if faces.ndim != 2 or faces.shape[1] != 3:
+        raise ValueError(f"faces must have shape (f, 3), got {faces.shape}")
+    if len(faces) == 0:
+        raise ValueError("it holds no faces")
+    if not np.issubdtype(faces.dtype, np.integer):
+        raise ValueError(f"faces must be whole numbers, got {faces.dtype}")
+    wrong = (faces < 0) | (faces >= len(vertices))
+    if wrong.any():
+        row = int(wrong.any(axis=1).argmax())
+        raise ValueError(
+            f"face {row} is {faces[row].tolist()}, but vertices are 0 to {len(vertices) - 1}"
+        )

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from ._clean import first_of_equals
+from ._indices import first_of_equals, groups
 
 # Edges with more faces than this are hard: all pairs of faces would be too many.
 _SHARING = 8
@@ -47,8 +47,6 @@ def smooth_groups(
     Those are reached from face to face over edges where the normals of the faces that meet differ
     by at most `angle` degrees; over an edge of more than eight faces nothing is reached.
     """
-    from scipy.sparse import coo_array, csgraph  # JAX itself needs SciPy
-
     corners = vertices[faces].astype(np.float64)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -62,7 +60,7 @@ def smooth_groups(
     sharing = np.diff(begins, append=len(ordered))
     edge = np.repeat(np.arange(len(begins)), sharing)
     order, edge = order[sharing[edge] <= _SHARING], edge[sharing[edge] <= _SHARING]
-    links = []
+    links = [(corner[:0], corner[:0])]
     for apart in range(1, int(min(sharing.max(), _SHARING))):
         same = edge[apart:] == edge[:-apart]
         one, two = order[:-apart][same], order[apart:][same]
@@ -72,6 +70,5 @@ def smooth_groups(
         same_way = start[one] == start[two]
         links.append((one, np.where(same_way, two, ahead[two])))
         links.append((ahead[one], np.where(same_way, ahead[two], two)))
-    one, two = (np.concatenate(ends) for ends in zip(*links, strict=True)) if links else ([], [])
-    graph = coo_array((np.ones(len(one), np.int8), (one, two)), shape=(faces.size, faces.size))
-    return csgraph.connected_components(graph, directed=False)[1].reshape(-1, 3)
+    one, two = (np.concatenate(ends) for ends in zip(*links, strict=True))
+    return groups(one, two, number=faces.size)[1].reshape(-1, 3)

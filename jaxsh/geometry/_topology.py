@@ -7,8 +7,7 @@ import numpy as np
 from jaxtyping import Array, Int
 
 from .._core.checks import check_type
-from ._clean import first_of_equals
-from ._files._text import ranges
+from ._indices import first_of_equals, groups, ranges
 from ._mesh import Mesh
 
 
@@ -114,9 +113,7 @@ def topology(mesh: Mesh) -> Topology:
     # Faces that share an edge share a fan around either of its ends.
     same_way = start[one] == start[two]
     beside = np.where(same_way, two, ahead[two]), np.where(same_way, ahead[two], two)
-    fans, fan = _groups(
-        np.concatenate([one, ahead[one]]), np.concatenate(beside), number=faces.size
-    )
+    fans, fan = groups(np.concatenate([one, ahead[one]]), np.concatenate(beside), number=faces.size)
     used, at = np.unique(start, return_inverse=True)
     vertex_of_fan = np.empty(fans, np.int64)
     vertex_of_fan[fan] = at
@@ -124,12 +121,12 @@ def topology(mesh: Mesh) -> Topology:
     # A rim passes from one boundary edge to the next within a fan.
     rim = order[first[sharing == 1]]
     ends = np.unique(np.concatenate([fan[rim], fan[ahead[rim]]]), return_inverse=True)
-    loops, _ = _groups(*ends[1].reshape(2, -1), number=len(ends[0]))
+    loops, _ = groups(*ends[1].reshape(2, -1), number=len(ends[0]))
     return Topology(
         vertices=len(used),
         edges=len(first),
         faces=len(faces),
-        components=_groups(at, at[ahead], number=len(used))[0],
+        components=groups(at, at[ahead], number=len(used))[0],
         boundary_edges=len(rim),
         boundary_loops=loops,
         nonmanifold_edges=int((sharing > 2).sum()),
@@ -209,15 +206,6 @@ def _to_all_copies(
     order = np.lexsort((other, vertex))
     vertex, other = vertex[order], other[order]
     return vertex[vertex != other], other[vertex != other]
-
-
-def _groups(one: np.ndarray, two: np.ndarray, *, number: int) -> tuple[int, np.ndarray]:
-    """Count the groups that links between `number` things make of them; label each thing."""
-    from scipy.sparse import coo_array, csgraph  # JAX itself needs SciPy
-
-    links = coo_array((np.ones(len(one), np.int8), (one, two)), shape=(number, number))
-    groups, labels = csgraph.connected_components(links, directed=False)
-    return int(groups), labels
 
 
 def _many(count: int, what: str) -> str:

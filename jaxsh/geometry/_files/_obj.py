@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._indices import ranges
 from ._mtl import Materials
 from ._polygons import Polygons
-from ._text import JOINT, Words, decode, parse, plain_text, ranges, unit_colors, without_comment
+from ._text import JOINT, Words, decode, parse, plain_text, unit_colors, without_comment
 
 # Every statement of the format (Wavefront's appendix B1): a damaged "f" must not pass for another.
 _STATEMENTS = re.compile(

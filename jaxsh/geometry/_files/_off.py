@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .._indices import ranges
 from ._polygons import Polygons
-from ._text import Words, plain_text, ranges, unit_colors
+from ._text import Words, plain_text, unit_colors
 
 _HEADER = re.compile(
     rb"\s*(?:#[^\n]*\n\s*)*(?P<uv>ST)?(?P<color>C)?(?P<normal>N)?(?P<four>4)?(?P<n>n)?OFF"

@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from .._base_color import BaseColor
+from .._indices import ranges
 from ._pictures import read_picture
 from ._ply_data import Columns, Lists, read_elements, read_header
 from ._polygons import Polygons
-from ._text import ranges, unit_colors
+from ._text import unit_colors
 
 _NORMALS = [("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z")]
 _UV = [("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t")]

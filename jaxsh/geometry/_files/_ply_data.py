@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._text import Words, decode, plain_text, ranges
+from .._indices import ranges
+from ._text import Words, decode, plain_text
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),

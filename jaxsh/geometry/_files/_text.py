@@ -6,6 +6,8 @@ import warnings
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from .._indices import ranges
+
 _BLANK = np.zeros(256, bool)
 _BLANK[list(b" \t\n\v\f\r")] = True
 # What the C libraries of some systems print for a value that is none.
@@ -125,12 +127,6 @@ def _parse(text: bytes, kind: type) -> np.ndarray | None:
             return np.fromstring(text, kind, sep=" ")
         except (DeprecationWarning, ValueError):
             return None
-
-
-def ranges(first: Int[np.ndarray, " n"], counts: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
-    """Put `first`, `first + 1`, …, so many as `counts` says, in a row for all."""
-    begin = np.cumsum(counts) - counts
-    return np.arange(int(counts.sum())) + np.repeat(first - begin, counts)
 
 
 def unit_colors(colors: Float[np.ndarray, "n k"]) -> tuple[Float[np.ndarray, "n 4"], str | None]:
