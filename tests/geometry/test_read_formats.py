@@ -206,6 +206,12 @@ def test_obj_odd_nan_is_no_comment(tmp_path, line):
     assert corners(mesh)[1].tolist() == [[1, 0, 0], [1, 1, 1], [0, 1, 0]]
 
 
+def test_obj_a_bare_s_is_no_group(tmp_path):
+    mesh, said = read(tmp_path / "a.obj", f"s 1\n{TRIANGLE}s\nf 1 2 3\ns")
+    assert said == ""
+    assert mesh.faces.tolist() == [[0, 1, 2]]
+
+
 @pytest.mark.parametrize(
     ("values", "encoding", "expected"),
     [

@@ -233,6 +233,7 @@ def _materials(path: Path, words: Words, text: bytes, kinds, found: list[str]):
 
 def _say_groups(words: Words, lines: np.ndarray, normals: bool, found: list[str]) -> None:
     """Say that smoothing groups are not looked at, where nothing else tells the hard edges."""
-    groups = {words.word(int(at) + 1) for at in words.first[lines] if words.counts.any()}
+    named = lines & (words.counts > 1)
+    groups = {words.word(int(at) + 1) for at in words.first[named]}
     if len(groups) > 1 and not normals:
         found.append(f"{len(groups)} smoothing groups ignored")
