@@ -30,7 +30,8 @@ class Materials:
     def __init__(self, path: Path, files: list[str], found: list[str]):
         self._found = found
         self._statements: dict[str, tuple[dict[str, str], Path]] = {}
-        self._colors: dict[str, BaseColor] = {}
+        self._colors: list[BaseColor] = []
+        self._rows: dict[str, int] = {}
         self._pictures: dict[Path | str, UInt8[np.ndarray, "h w 4"] | None] = {}
         # A line may name several files, and a name may hold blanks.
         for line in files:
@@ -47,13 +48,14 @@ class Materials:
 
     def row(self, name: str) -> int:
         """Give the row of a material in `table`, which is in the order of first use."""
-        if name not in self._colors:
+        if name not in self._rows:
+            self._rows[name] = len(self._rows)
             if name in self._statements:
-                self._colors[name] = self._color(name, *self._statements[name])
+                self._colors.append(self._color(name, *self._statements[name]))
             else:
                 self._missing.append(name)
-                self._colors[name] = BaseColor(name)
-        return list(self._colors).index(name)
+                self._colors.append(BaseColor(name))
+        return self._rows[name]
 
     def table(self) -> tuple[BaseColor, ...]:
         """Give the materials that faces name, and say what of them is not read."""
@@ -61,7 +63,7 @@ class Materials:
             self._found.append(f"materials in no file are white ({' '.join(self._missing)})")
         if self._unread:
             self._found.append(f"of materials ignored ({' '.join(sorted(self._unread))})")
-        return tuple(self._colors.values())
+        return tuple(self._colors)
 
     def _read(self, place: Path) -> None:
         """Collect the statements of each material of a file; of two with one name the first."""
