@@ -13,7 +13,7 @@ from .._core import srgb
 from .._core.checks import described
 from .._core.words import reason
 from ._clean import Clean, clean
-from ._files._polygons import Polygons
+from ._files._polygons import Polygons, unit
 from ._files._triangulate import triangulate
 from ._mesh import Mesh, vertex_normals
 from ._split import smooth_groups, split
@@ -113,13 +113,13 @@ def assemble(
         corner, faces = split(whole.faces, knots, raw, attributes)
         vertices = whole.vertices[whole.faces.ravel()[corner]]
         given = np.asarray(at_knots)[knots] if vectors is None else vectors
-        unit = jnp.asarray(given.reshape(-1, 3)[corner])
+        normal = jnp.asarray(given.reshape(-1, 3)[corner])
     else:
-        corner, faces, vertices, unit = slice(0), whole.faces, whole.vertices, at_knots
+        corner, faces, vertices, normal = slice(0), whole.faces, whole.vertices, at_knots
     return Mesh(
         jnp.asarray(vertices),
         jnp.asarray(faces),
-        unit,
+        normal,
         uv=None if uv is None else jnp.asarray(uv.reshape(-1, 2)[corner]),
         colors=None if colors is None else jnp.asarray(colors.reshape(-1, 4)[corner]),
         face_material=material,
@@ -162,8 +162,8 @@ def _in_blocks(
 
 def _from_file(given: np.ndarray, slots: np.ndarray, whole: Clean) -> tuple[np.ndarray, list[str]]:
     """Take unit normals (f, 3, 3) from the file, smooth ones where it has none or bad ones."""
-    unit = _in_blocks(_unit, given, slots)
-    good = np.asarray(np.isfinite(unit).all(axis=2))
+    vectors = _in_blocks(lambda rows: unit(rows) + 0.0, given, slots)
+    good = np.asarray(np.isfinite(vectors).all(axis=2))
     said = []
     if not good.all():
         missing = int(np.isnan(given[slots[~good]]).all(axis=1).sum())
@@ -172,26 +172,15 @@ def _from_file(given: np.ndarray, slots: np.ndarray, whole: Clean) -> tuple[np.n
             (missing, "corners without a normal given a smooth one"),
         ]
         knots, smooth = _knots(whole, "smooth")
-        unit = np.where(good[..., None], unit, np.asarray(smooth)[knots])
+        vectors = np.where(good[..., None], vectors, np.asarray(smooth)[knots])
     behind = 0
     for start in range(0, len(slots), _BLOCK):
         block = slice(start, start + _BLOCK)
         a, b, c = np.moveaxis(whole.vertices[whole.faces[block]].astype(np.float64), 1, 0)
-        along = np.einsum("fki,fi->fk", unit[block], np.cross(b - a, c - a))
+        along = np.einsum("fki,fi->fk", vectors[block], np.cross(b - a, c - a))
         behind += int((along < 0).all(axis=1).sum())
     said.append((behind, "faces whose normals point against the order of their corners"))
-    return unit, [f"{count} {what}" for count, what in said if count]
-
-
-def _unit(normals: np.ndarray) -> np.ndarray:
-    """Give normals (f, 3, 3) the length 1, NaN where they have no direction."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        # First by the largest component: squares of very long or short ones leave the range.
-        unit = normals / np.abs(normals).max(axis=2, keepdims=True)
-        unit /= np.linalg.norm(unit, axis=2, keepdims=True)
-        # Of length 1 to float32's rounding: kept to the bit.
-        unit = np.where(np.abs(unit - normals).max(axis=2, keepdims=True) < 1e-6, normals, unit)
-    return unit + 0.0
+    return vectors, [f"{count} {what}" for count, what in said if count]
 
 
 def _uv(uv: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from ._gltf_json import extension, listed
 from ._gltf_materials import Materials
 from ._gltf_primitives import Part, read_parts
 from ._gltf_scene import Placement, placements
-from ._polygons import Polygons
+from ._polygons import Polygons, unit
 
 # Vertices whose joints are blended at once: a matrix for each takes memory.
 _BLOCK = 2**14
@@ -165,21 +165,10 @@ def _joined(parts: list[Part], materials: Materials, found: tuple[str, ...]) -> 
         np.concatenate([part.positions for part in parts]),
         np.concatenate([face.ravel() for face in faces]),
         np.full(ends[-1] // 3, 3),
-        joined([_unit(part.normals) for part in parts], 3),
+        joined([None if part.normals is None else unit(part.normals) for part in parts], 3),
         joined([part.uv for part in parts], 2),
         joined([part.colors for part in parts], 4),
         rows if materials.table else None,
         materials.table,
         found,
     )
-
-
-def _unit(normals: Float[np.ndarray, "n 3"] | None) -> Float[np.ndarray, "n 3"] | None:
-    """Give normals the length 1, NaN where they have no direction."""
-    if normals is None:
-        return None
-    # First by the largest component: squares of very long or short ones leave the range.
-    scaled = normals / np.abs(normals).max(axis=1, keepdims=True, initial=0)
-    unit = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
-    # Of length 1 to float32's rounding: kept to the bit.
-    return np.where(np.abs(unit - normals).max(axis=1, keepdims=True) < 1e-6, normals, unit)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from .._indices import ranges
-from ._polygons import Polygons
+from ._polygons import Polygons, at_corners, without_points_and_lines
 from ._text import Words, plain_text, unit_colors
 
 _HEADER = re.compile(
@@ -48,9 +48,7 @@ def _text(words: Words, header: re.Match | None) -> Polygons:
         raise ValueError("it does not begin with its numbers of vertices, faces and edges")
     vertices, faces, *_ = words.numbers(np.arange(words.counts[0]), np.int64).tolist()
     if vertices < 0 or faces < 0 or lines < 1 + vertices + faces:
-        raise ValueError(
-            f"it announces {vertices + faces + 1} lines of data, but has {max(lines, 0)}"
-        )
+        raise ValueError(f"it announces {vertices + faces + 1} lines of data, but has {lines}")
     found = []
     if lines > 1 + vertices + faces:
         found.append(f"{lines - 1 - vertices - faces} lines after the last face ignored")
@@ -147,9 +145,8 @@ def _binary(data: bytes, header: re.Match) -> Polygons:
     positions, normals, uv, colors = _columns(table, header, found)
     rest = numbers[width * vertices :].astype(np.int64)
     first, sizes, colored = _binary_faces(rest, faces)
-    more = int(colored.sum())
-    if more:
-        found.append(f"colors of {int((colored > 0).sum())} faces ignored")
+    if ignored := int((colored > 0).sum()):
+        found.append(f"colors of {ignored} faces ignored")
     corners = rest[ranges(first + 1, sizes)]
     return _polygons(positions, corners, sizes, normals, uv, colors, None, found)
 
@@ -170,22 +167,11 @@ def _binary_faces(rest: np.ndarray, faces: int):
 
 
 def _polygons(positions, corners, sizes, normals, uv, colors, face_colors, found) -> Polygons:
-    """Leave out points and lines, and spread what vertices or faces have over their corners."""
-    keep = sizes >= 3
-    if few := int((~keep).sum()):
-        found.append(f"{few} faces of fewer than three corners ignored")
-    corners, kept = corners[np.repeat(keep, sizes)], sizes[keep]
+    """Spread what vertices or faces have over their corners; leave out points and lines."""
     if face_colors is not None and colors is not None:
         found.append("colors of faces ignored, since vertices have some")
-    inside = np.clip(corners, 0, max(len(positions) - 1, 0))  # those outside are refused later
-
-    def at_corners(values: np.ndarray | None) -> np.ndarray | None:
-        return None if values is None or not len(values) else values[inside]
-
-    if colors is not None:
-        colors = at_corners(colors)
-    elif face_colors is not None:
-        colors = np.repeat(face_colors[keep], kept, axis=0)
-    return Polygons(
-        positions, corners, kept, at_corners(normals), at_corners(uv), colors, found=tuple(found)
-    )
+    normals, uv, colors = (at_corners(values, corners) for values in (normals, uv, colors))
+    if face_colors is not None and colors is None:
+        colors = np.repeat(face_colors, sizes, axis=0)
+    polygons = Polygons(positions, corners, sizes, normals, uv, colors, found=tuple(found))
+    return without_points_and_lines(polygons)

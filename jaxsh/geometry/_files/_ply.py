@@ -8,7 +8,7 @@ from .._base_color import BaseColor
 from .._indices import ranges
 from ._pictures import read_picture
 from ._ply_data import Columns, Lists, read_elements, read_header
-from ._polygons import Polygons
+from ._polygons import Polygons, at_corners, without_points_and_lines
 from ._text import unit_colors
 
 _NORMALS = [("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z")]
@@ -49,12 +49,7 @@ def read_ply(path: Path, data: bytes) -> Polygons:
     strips = _strips(elements.get("tristrips", {}), found)
     corners = np.concatenate([polygons.values, strips.values])
     sizes = np.concatenate([polygons.sizes, strips.sizes])
-    inside = np.clip(corners, 0, max(len(positions) - 1, 0))  # those outside are refused later
-
-    def at_corners(values: np.ndarray | None) -> np.ndarray | None:
-        return None if values is None or not len(values) else values[inside]
-
-    normals, uv, colors = map(at_corners, (normals, uv, colors))
+    normals, uv, colors = (at_corners(values, corners) for values in (normals, uv, colors))
     face_uv = _face_uv(face, used, found)
     if face_uv is not None:
         uv = np.full((len(corners), 2), np.nan)
@@ -73,18 +68,9 @@ def read_ply(path: Path, data: bytes) -> Polygons:
         if element.name not in ("vertex", "face", "tristrips") and element.rows:
             found.append(f"{element.rows} elements {element.name!r} ignored")
 
-    whole = Polygons(positions, corners, sizes, normals, uv, colors, material, materials)
-    keep = sizes >= 3
-    if few := int((~keep).sum()):
-        found.append(f"{few} faces of fewer than three corners ignored")
-        at = np.repeat(keep, sizes)
-        rows = {
-            name: None if (a := getattr(whole, name)) is None else a[at]
-            for name in ("corners", "normals", "uv", "colors")
-        }
-        material = None if material is None else material[keep]
-        whole = whole._replace(**rows, sizes=sizes[keep], polygon_material=material)
-    return whole._replace(found=tuple(found))
+    return without_points_and_lines(
+        Polygons(positions, corners, sizes, normals, uv, colors, material, materials, tuple(found))
+    )
 
 
 def _columns(columns: Columns, names: list[tuple[str, ...]], used: set[str]) -> np.ndarray | None:

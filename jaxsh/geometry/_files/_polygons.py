@@ -25,3 +25,45 @@ class Polygons(NamedTuple):
     polygon_material: Int[np.ndarray, " p"] | None = None  # row of `materials`, -1 for none
     materials: tuple[BaseColor, ...] = ()
     found: tuple[str, ...] = ()  # phrases for the one warning: what was ignored, and how often
+
+
+def at_corners(
+    values: Float[np.ndarray, "n _"] | None, corners: Int[np.ndarray, " c"]
+) -> Float[np.ndarray, "c _"] | None:
+    """Give what vertices carry at the corners that name them."""
+    if values is None or not len(values):
+        return None
+    return values[np.clip(corners, 0, len(values) - 1)]  # those outside are refused later
+
+
+def without_points_and_lines(polygons: Polygons) -> Polygons:
+    """Leave out faces of fewer than three corners, and say so."""
+    keep = polygons.sizes >= 3
+    few = int((~keep).sum())
+    if not few:
+        return polygons
+    at = np.repeat(keep, polygons.sizes)
+
+    def kept(rows: np.ndarray | None, which: np.ndarray) -> np.ndarray | None:
+        return None if rows is None else rows[which]
+
+    return polygons._replace(
+        corners=polygons.corners[at],
+        sizes=polygons.sizes[keep],
+        normals=kept(polygons.normals, at),
+        uv=kept(polygons.uv, at),
+        colors=kept(polygons.colors, at),
+        polygon_material=kept(polygons.polygon_material, keep),
+        found=(*polygons.found, f"{few} faces of fewer than three corners ignored"),
+    )
+
+
+def unit(vectors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Give vectors the length 1, NaN where they have no direction."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # First by the largest component: squares of very long or short ones leave the range.
+        scaled = vectors / np.abs(vectors).max(axis=-1, keepdims=True)
+        scaled /= np.linalg.norm(scaled, axis=-1, keepdims=True)
+        # Of length 1 to float32's rounding: kept to the bit.
+        near = np.abs(scaled - vectors).max(axis=-1, keepdims=True) < 1e-6
+        return np.where(near, vectors, scaled)
