@@ -28,6 +28,8 @@ _LOST = 1e-3
 _FAR = 8
 # What float32 changes in a face, as a share of its size, is said above this.
 _MOVED = 0.05
+# Letters of a warning that come from a parser.
+_SAID = 600
 # Faces whose corners are held in float64 at a time.
 _BLOCK = 1 << 16
 
@@ -67,7 +69,7 @@ def assemble(
 
     `corners` as in `clean`, `encoding` that of the colors; the rest as in `read_mesh`.
     """
-    found = [reason(phrase) for phrase in polygons.found]  # may hold names from the file
+    found = _in_short(polygons.found)
     slots, owner, crossed = triangulate(polygons.positions, polygons.corners, polygons.sizes)
     if crossed:
         found.append(f"{crossed} polygons that cross over themselves cut as well as can be")
@@ -103,8 +105,7 @@ def assemble(
     attributes += [a for a in (uv, colors) if a is not None]
     found += whole.found
     if found:
-        said = reason(", ".join(found), 600)  # names in the file may be anything
-        warnings.warn(f"{source}: {said}", UserWarning, stacklevel=3)
+        warnings.warn(f"{source}: {', '.join(found)}", UserWarning, stacklevel=3)
 
     material = None
     if polygons.polygon_material is not None and polygons.materials:
@@ -126,6 +127,13 @@ def assemble(
         materials=polygons.materials,
         origin=(float(center[0]), float(center[1]), float(center[2])),
     )
+
+
+def _in_short(phrases: Sequence[str]) -> list[str]:
+    """Cut what a parser found, and say how much more there is: names in a file may be anything."""
+    short = [reason(phrase) for phrase in phrases]
+    fit = int((np.cumsum([len(phrase) for phrase in short]) <= _SAID).sum())
+    return short[:fit] + ([f"{len(short) - fit} findings more"] if fit < len(short) else [])
 
 
 def _knots(whole: Clean, normals: Normals):

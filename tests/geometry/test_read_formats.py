@@ -181,6 +181,14 @@ def test_mtl_numbers_out_of_range(tmp_path, lines, factor, phrase):
     assert said == phrase
 
 
+def test_long_names_hide_no_counts(tmp_path):
+    libraries = "".join(f"mtllib {name * 150}.mtl\n" for name in "abcdefg")
+    _, said = read(tmp_path / "a.obj", f"{libraries}{TRIANGLE}usemtl a\nf 1 2 3\nf 1 1 2\n")
+    assert "'{}.mtl' are not there".format("a" * 150) in said
+    assert said.endswith(", 5 findings more, 1 degenerate faces dropped")
+    assert len(said) < 700
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
 @pytest.mark.parametrize("names", [("Müller", "Möller"), ("#1", "#2"), ("a#b", "a#c")])
 def test_obj_names_stay_apart(tmp_path, names, encoding):
