@@ -137,15 +137,12 @@ def _polygons(part: Any, own_normals: bool) -> Polygons:
         normals=np.asarray(part.vertex_normals, np.float64)[corners] if own_normals else None,
         uv=uv,
         colors=colors,
-        polygon_material=np.zeros(len(part.faces), np.int64),
         materials=(material,),
     )
 
 
 def _joined(parts: list[Polygons]) -> Polygons:
     """Put meshes in a row; what only some of them carry is NaN on the others."""
-    if len(parts) == 1 and _plain(parts[0]):
-        return parts[0]._replace(polygon_material=None, materials=())
 
     def together(name: str, width: int) -> np.ndarray | None:
         rows = [getattr(part, name) for part in parts]

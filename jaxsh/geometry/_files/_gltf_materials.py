@@ -1,5 +1,6 @@
 """Read the base color of glTF materials, and where their textures lie."""
 
+import dataclasses
 import math
 from typing import NamedTuple
 
@@ -101,10 +102,7 @@ class Materials:
         number = whole(info, "index", f"the texture of {owner}")
         fields = self._document.item("textures", number, owner)
         name = f"texture {number}"
-        color = surface.color
-        color = BaseColor(
-            color.name, color.factor, self._pictures.read(fields, name), color.double_sided
-        )
+        color = dataclasses.replace(surface.color, texture=self._pictures.read(fields, name))
         uv_set, matrix = whole(info, "texCoord", owner, 0), None
         transform = extension(info, "KHR_texture_transform", owner)
         if transform is not None:
