@@ -433,6 +433,13 @@ def test_unknown_extension(tmp_path, full, name):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_folder_of_that_name_is_refused_and_nothing_is_made(tmp_path, full):
+    (tmp_path / "full.obj").mkdir()
+    with pytest.raises(IsADirectoryError, match=r"full\.obj: cannot be written: it is a folder"):
+        write_mesh(tmp_path / "full.obj", full)
+    assert [file.name for file in tmp_path.iterdir()] == ["full.obj"]
+
+
 def test_an_interrupted_write_leaves_the_old_files(tmp_path, full, monkeypatch):
     path = tmp_path / "full.obj"
     written(path, full)

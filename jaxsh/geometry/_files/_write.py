@@ -75,6 +75,8 @@ def write_mesh(
     arrays, form = on_host(mesh), _FORMATS[suffix]
     if reason := problem(arrays):
         raise ValueError(f"{path}: cannot be written: {reason}")
+    if path.is_dir():
+        raise IsADirectoryError(f"{path}: cannot be written: it is a folder")
     if suffix == ".stl" and any(arrays.origin):
         raise ValueError(
             f"{path}: .stl has float32 positions, which cannot hold the origin {arrays.origin}: "
