@@ -56,7 +56,10 @@ def test_sky(kind, lit, rng):
     sun = jnp.array([0.6, 0.0, 0.8])
     observed = transfer.shade_diffuse(glow(sun, 3.0), lit, 0.5)
     observed = observed + jnp.asarray(1e-6 * rng.normal(size=observed.shape))
-    fit = lambda o, t: inverse.fit_sky(o, t, 0.5, sky=glow, starts=2)  # noqa: E731
+
+    def fit(observed, transfer):
+        return inverse.fit_sky(observed, transfer, 0.5, sky=glow, starts=2)
+
     found = check(fit, kind, (sun, 3.0, 1.0), observed, lit)
     if kind == AxisType.Explicit:
         expected = jax.jit(fit)(observed, lit).confidence.covariance
@@ -76,7 +79,10 @@ def seen(lit, lights):
 @pytest.mark.parametrize("kind", KINDS)
 def test_colors(kind, lit):
     lights = lamp(-1.0, [2.0, 1.0, 0.0]), lamp(0.6, [0.5, 1.0, 3.0])
-    fit = lambda o, t: inverse.fit_colors(o, t, 0.5, lights)  # noqa: E731
+
+    def fit(observed, transfer):
+        return inverse.fit_colors(observed, transfer, 0.5, lights)
+
     check(fit, kind, jnp.stack([p.radiance for p in lights]), seen(lit, lights), lit)
 
 
@@ -84,7 +90,10 @@ def test_colors(kind, lit):
 @pytest.mark.parametrize("kind", KINDS)
 def test_polygons(kind, lit):
     start = [lamp(-0.8, [1.0, 1.0, 1.0])]
-    fit = lambda o, t: inverse.fit_polygons(o, t, 0.5, start, turn=False)  # noqa: E731
+
+    def fit(observed, transfer):
+        return inverse.fit_polygons(observed, transfer, 0.5, start, turn=False)
+
     truth = lamp(-1.0, [2.0, 1.0, 0.5])
     check(fit, kind, inverse.rectangle_of(truth), seen(lit, [truth]), lit)
 

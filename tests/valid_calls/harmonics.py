@@ -1,0 +1,35 @@
+"""Valid calls of `jaxsh.harmonics`."""
+
+import numpy as np
+
+from jaxsh import harmonics
+
+from .shared import K, floats, of
+
+
+def calls():
+    h = harmonics
+    f, vectors = floats(2, K), floats(5, 3)
+    return {
+        "clamped_cosine": of(h.clamped_cosine, degree=2),
+        "convolve": of(h.convolve, coefficients=f, zonal=floats(3)),
+        "damping": of(h.damping, strength=floats(), degree=2),
+        "degree_of": of(h.degree_of, count=9),
+        "degrees": of(h.degrees, degree=2),
+        "dering": of(h.dering, coefficients=f, of="irradiance"),
+        "evaluate": of(h.evaluate, vectors=vectors, degree=2, axis=-1),
+        "evaluate_with_gradient": of(h.evaluate_with_gradient, vectors=vectors, degree=2, axis=-1),
+        "gaunt": of(h.gaunt, degree=1),
+        "index": of(h.index, l=2, m=-1),
+        "legendre": of(h.legendre, cos_theta=np.zeros(4), degree=2, host=True, finite="cos_theta"),
+        "num_coefficients": of(h.num_coefficients, degree=2),
+        "orders": of(h.orders, degree=2),
+        "phong": of(h.phong, exponent=floats(), degree=2, normalized=True, finite="exponent"),
+        "product": of(h.product, f=f, g=f[0], degree=2),
+        "product_matrix": of(h.product_matrix, f=f, degree=2),
+        "rotate": of(h.rotate, coefficients=f, rotation=np.eye(3), finite="rotation"),
+        "rotate_z": of(h.rotate_z, coefficients=f, angle=floats()),
+        "rotation_matrix": of(h.rotation_matrix, rotation=np.eye(3), degree=2, finite="rotation"),
+        "triple_integral": of(h.triple_integral, f=f, g=f, h=f),
+        "window": of(h.window, kind="hann", degree=2),
+    }

@@ -1,0 +1,74 @@
+"""Valid calls of `jaxsh.imaging`."""
+
+import numpy as np
+
+from jaxsh import geometry, imaging
+
+from .shared import eye, floats, knot, of
+
+
+def calls():
+    i = imaging
+    image, mesh = floats(6, 12, 3), knot()
+    camera = i.Camera((0.3, -4.0, 0.2), (0.0, 0.0, 0.0), width=6, height=8)
+    raster = i.rasterize(mesh, camera)
+    return {
+        "Camera": of(
+            i.Camera,
+            position=eye(),
+            target=np.zeros(3),
+            up=np.array([0.0, 0.0, 1.0]),
+            fov_y=40.0,
+            width=6,
+            height=8,
+            finite="position target up fov_y",
+        ),
+        "Camera.facing": of(
+            i.Camera.facing,
+            mesh=mesh,
+            toward=(0.0, -1.0, 0.2),
+            fov_y=30.0,
+            width=6,
+            height=8,
+            margin=0.05,
+            free="toward",
+            host=True,
+            finite="fov_y margin",
+        ),
+        "auto_exposure": of(
+            i.auto_exposure, image=image, mask=image[..., 0] > 0.5, percentile=90.0
+        ),
+        "backdrop": of(i.backdrop, environment=image, camera=camera),
+        "interpolate": of(
+            i.interpolate, raster=raster, values=floats(300, 3), background=floats(3)
+        ),
+        "look_up": of(i.look_up, environment=image, directions=floats(4, 3)),
+        "psnr": of(i.psnr, image=image, reference=image, mask=image[..., 0] > 0.5, peak=1.0),
+        "rasterize": of(
+            i.rasterize,
+            mesh=mesh,
+            camera=camera,
+            samples=1,
+            scene=geometry.ray_scene(mesh),
+            slow=True,
+        ),
+        "read_environment": of(
+            i.read_environment,
+            path="no such file.exr",
+            layout="lat-long",
+            orientation="jaxsh",
+            encoding="srgb",
+            layer="beauty",
+            height=8,
+            repair=True,
+            free="path layer",
+            slow=True,
+        ),
+        "srgb_decode": of(i.srgb_decode, signal=image),
+        "srgb_encode": of(i.srgb_encode, linear=image),
+        "studio": of(i.studio, height=8, width=16),
+        "tone_map": of(i.tone_map, image=image, exposure=1.0, curve="reinhard", white=2.0),
+        "write_image": of(
+            i.write_image, path="/dev/null/no/a.exr", image=image, encoding=None, slow=True
+        ),
+    }

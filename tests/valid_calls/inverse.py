@@ -1,0 +1,34 @@
+"""Valid calls of `jaxsh.inverse`."""
+
+import jax.numpy as jnp
+
+from jaxsh import inverse
+
+from .shared import V, floats, lamp, made, of
+
+
+def glow(sun, turbidity):
+    """A sky of degree 1, brighter towards the sun."""
+    return jnp.tile(jnp.concatenate([jnp.ones(1), turbidity * sun]), (3, 1))
+
+
+def calls():
+    i = inverse
+    data = {"observed": floats(V, 3), "transfer": made(), "albedo": floats(V, 3)}
+    solver = {"weights": floats(V), "tolerance": 1e-5, "max_steps": 3, "throw": True}
+    finite = {"finite": "observed albedo weights", "slow": True}
+    return {
+        "fit_colors": of(i.fit_colors, **data, lights=[lamp()], upper=9.0, **solver, **finite),
+        "fit_polygons": of(i.fit_polygons, **data, start=[lamp()], turn=True, **solver, **finite),
+        "fit_sky": of(
+            i.fit_sky,
+            **data,
+            sky=glow,
+            turbidity=(2.5, 6.0),
+            exposure=1.0,
+            starts=2,
+            **solver,
+            **finite,
+        ),
+        "rectangle_of": of(i.rectangle_of, polygon=lamp()),
+    }

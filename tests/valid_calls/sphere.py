@@ -1,0 +1,28 @@
+"""Valid calls of `jaxsh.sphere`."""
+
+import numpy as np
+
+from jaxsh import sphere
+
+from .shared import K, V, floats, of
+
+
+def calls():
+    s = sphere
+    quadrature = s.fibonacci(7)
+    return {
+        "Quadrature": of(
+            s.Quadrature, directions=np.asarray(quadrature.directions), weights=floats(7)
+        ),
+        "cube_map": of(s.cube_map, resolution=2),
+        "fibonacci": of(s.fibonacci, count=7),
+        "gauss_legendre": of(s.gauss_legendre, degree=2),
+        "irradiance": of(s.irradiance, light=floats(3, K), normals=floats(V, 3), finite="light"),
+        "lat_long": of(s.lat_long, height=4, width=8),
+        "project": of(s.project, values=floats(3, 7), quadrature=quadrature, degree=2),
+        "project_lat_long": of(s.project_lat_long, image=floats(6, 12, 3), degree=2),
+        "reconstruct": of(s.reconstruct, coefficients=floats(3, K), directions=floats(7, 3)),
+        "reconstruct_lat_long": of(
+            s.reconstruct_lat_long, coefficients=floats(3, K), height=4, width=8
+        ),
+    }

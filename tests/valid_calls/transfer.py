@@ -1,0 +1,98 @@
+"""Valid calls of `jaxsh.transfer`."""
+
+import numpy as np
+
+from jaxsh import transfer
+
+from .shared import K, V, eye, floats, knot, made, material, of
+
+
+def calls():
+    t = transfer
+    light, flags = floats(3, K), {"distant": True, "normalized": True}
+    return {
+        "Material": of(
+            t.Material,
+            diffuse=floats(V, 3),
+            specular=0.5,
+            exponent=floats(V),
+            finite="diffuse specular exponent",
+        ),
+        "Transfer": of(
+            t.Transfer,
+            coefficients=floats(V, K),
+            positions=floats(V, 3),
+            normals=floats(V, 3),
+            neighbors=np.zeros((V, 2), np.int32),
+        ),
+        "Transfer.truncated": of(made().truncated, degree=1),
+        "FixedLight.__call__": of(
+            t.fixed_light(light, made()), eye=eye(), material=material(), **flags, finite="eye"
+        ),
+        "FixedView.__call__": of(
+            t.fixed_view(made(), eye(), material()), light=light, finite="light"
+        ),
+        "bake": of(
+            t.bake,
+            mesh=knot(),
+            degree=1,
+            directions=16,
+            shadows=True,
+            bounces=0,
+            albedo=0.5,
+            ray_bias=1e-4,
+            offset=None,
+            scene=None,
+            seed=0,
+            chunk=16,
+            checkpoint=None,
+            finite="albedo ray_bias",
+            free="checkpoint",
+            slow=True,
+        ),
+        "fixed_light": of(t.fixed_light, light=light, transfer=made(), finite="light"),
+        "fixed_view": of(
+            t.fixed_view,
+            transfer=made(),
+            eye=eye(),
+            material=material(),
+            degree=1,
+            **flags,
+            finite="eye",
+        ),
+        "load": of(t.load, path="no such file", host=True),
+        "quantize": of(t.quantize, transfer=made()),
+        "reflected_direction": of(
+            t.reflected_direction,
+            eye=eye(),
+            positions=floats(V, 3),
+            normals=floats(V, 3),
+            distant=False,
+            finite="eye",
+        ),
+        "sample": of(t.sample, transfer=made(), degree=1),
+        "save": of(t.save, path="/dev/null/no/folder", transfer=made(), host=True),
+        "shade_diffuse": of(
+            t.shade_diffuse,
+            light=light,
+            transfer=made(),
+            albedo=floats(V, 3),
+            finite="light albedo",
+        ),
+        "shade_glossy": of(
+            t.shade_glossy,
+            light=light,
+            transfer=made(),
+            eye=eye(),
+            material=material(),
+            **flags,
+            finite="light eye",
+        ),
+        "unshadowed": of(
+            t.unshadowed,
+            positions=floats(V, 3),
+            normals=floats(V, 3),
+            degree=2,
+            neighbors=np.zeros((V, 2), np.int32),
+        ),
+    }
