@@ -18,15 +18,15 @@ bin := $(VENV)/bin
 # loadfile: what one file has traced serves its other tests.
 PARALLEL ?= -n auto --dist loadfile
 # Unoptimized machine code, by XLA's older way for loops on the CPU where this JAX still knows it: that
-# runs slower and compiles in half the time, which is most of what tests do. Slow tests, test-all and
+# runs slower and compiles much faster, which is most of what tests do. Slow tests, test-all and
 # a plain pytest go without.
 QUICK_COMPILE ?= --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false
 
 .PHONY: reproduce test test-slow test-all test-oldest test-newest test-minimal check docs package bench fuzz clean
 
-# Groups of dependencies need pip >= 25.1.
+# An environment, of another Python where one is named. Groups of dependencies need pip >= 25.1.
 define environment
-	$(PYTHON) -m venv $(1)
+	$(or $(2),$(PYTHON)) -m venv $(1)
 	$(1)/bin/python -m pip install --quiet --upgrade pip
 endef
 
@@ -57,8 +57,7 @@ $(OLDEST_VENV)/installed: pyproject.toml tools/floors.py
 
 # Beside the others only where this machine has a newer Python: JAX leaves old ones behind.
 $(NEWEST_VENV)/installed: pyproject.toml tools/newest_python.py
-	$$($(PYTHON) tools/newest_python.py) -m venv $(NEWEST_VENV)
-	$(NEWEST_VENV)/bin/python -m pip install --quiet --upgrade pip
+	$(call environment,$(NEWEST_VENV),$$($(PYTHON) tools/newest_python.py))
 	$(NEWEST_VENV)/bin/python -m pip install --quiet --editable . --group test
 	touch $@
 

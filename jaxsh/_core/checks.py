@@ -17,10 +17,10 @@ from jaxtyping import Array, Float, Int
 
 # A light, an eye, a few thousand albedos: looking at more would take time of every call.
 _FEW = 2**16
+_SHORT = 256
 _ON_HOST = "this runs on the host, before jit, vmap and grad"
-# JAX arrays that were looked at and are right, by the bound and by their ids, for as long as they
-# live: they do not change.
-_right: dict[float | None, weakref.WeakValueDictionary[int, Any]] = {}
+# The JAX array that was last found right for a name and a bound: arrays do not change.
+_right: dict[tuple[str, float | None], weakref.ref[Any]] = {}
 
 
 def as_float(value: Any, name: str = "") -> Float[Array, "..."]:
@@ -60,12 +60,7 @@ def as_host_float(value: Any, name: str) -> Float[np.ndarray, "..."]:
 
     Raises `ValueError` for what is traced or no real numbers.
     """
-    if isinstance(value, Tracer):
-        raise ValueError(f"expected known values for {name}, got traced ones: {_ON_HOST}")
-    try:
-        array = np.asarray(value)
-    except (TypeError, ValueError):  # lists of several lengths
-        raise ValueError(f"expected real numbers for {name}, got {described(value)}") from None
+    array = _as_host_array(value, name, "real numbers")
     if array.dtype.kind in "iu" and array.dtype.itemsize < 4:
         raise ValueError(f"expected real numbers for {name}, got dtype {said_dtype(array.dtype)}")
     if jnp.issubdtype(array.dtype, jnp.floating):
@@ -77,15 +72,19 @@ def as_host_float(value: Any, name: str) -> Float[np.ndarray, "..."]:
 
 def as_host_integer(value: Any, name: str) -> Int[np.ndarray, "..."]:
     """Convert to integers on the host; raises `ValueError` for what is traced or none."""
-    if isinstance(value, Tracer):
-        raise ValueError(f"expected known values for {name}, got traced ones: {_ON_HOST}")
-    try:
-        array = np.asarray(value)
-    except (TypeError, ValueError):  # lists of several lengths
-        raise ValueError(f"expected integers for {name}, got {described(value)}") from None
+    array = _as_host_array(value, name, "integers")
     if array.dtype.kind not in "iu":
         raise ValueError(f"expected integers for {name}, got {described(value)}")
     return array
+
+
+def _as_host_array(value: Any, name: str, wanted: str) -> np.ndarray:
+    if isinstance(value, Tracer):
+        raise ValueError(f"expected known values for {name}, got traced ones: {_ON_HOST}")
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError):  # lists of several lengths
+        raise ValueError(f"expected {wanted} for {name}, got {described(value)}") from None
 
 
 def as_finite(
@@ -107,32 +106,38 @@ def check_finite(name: str, value: Any, *, least: float | None = None, wait: boo
 
     At hand are arrays of up to 65,536 numbers on the host or on CPU devices of this process. With
     `wait`, for what is made once, also larger ones and those on an accelerator, which has to finish
-    them first. What is traced is not looked at, and a JAX array once in its life: a frame with the
-    light of the last one pays half a microsecond for it.
+    them first. What is traced is not looked at, nor a JAX array that came for this name the last
+    time. `tools/measure_checks.py` prints what that costs a call.
     """
     if isinstance(value, float) and math.isfinite(value) and (least is None or value >= least):
         return
-    if (right := _right.get(least)) is None:
-        right = _right[least] = weakref.WeakValueDictionary()
     if isinstance(value, Array):
-        if right.get(id(value)) is value:
+        last = _right.get((name, least))
+        if last is not None and last() is value:
             return
         if not (is_concrete(value) if wait else _at_hand(value)):
             return
     array = np.asarray(value)
     if array.size > _FEW and not wait:
         return
-    if least is None:
-        fine = np.isfinite(array).all()
-    else:  # two reductions are faster than three; comparisons with NaN are false
-        fine = array.size == 0 or (array.min() >= least and array.max() < math.inf)
-    if not fine:
+    if not _fine(array, least):
         wrong = array[~(np.isfinite(array) & (True if least is None else array >= least))]
         bound = "" if least is None else f" and >= {least:g}"
         where = f" in {wrong.size} of {array.size} places" if array.ndim else ""
         raise ValueError(f"{name} must be finite{bound}, got {wrong.flat[0]:g}{where}")
     if isinstance(value, Array):
-        right[id(value)] = value
+        _right[name, least] = weakref.ref(value)
+
+
+def _fine(array: np.ndarray, least: float | None) -> bool:
+    if array.size <= _SHORT:  # Python's own sum is faster there; NaN and infinity stay in it
+        numbers = array.ravel().tolist()
+        if math.isfinite(sum(numbers)):
+            return least is None or min(numbers, default=least) >= least
+    if least is None:
+        return bool(np.isfinite(array).all())
+    # Two reductions are faster than three; comparisons with NaN are false.
+    return bool(array.min() >= least and array.max() < math.inf)
 
 
 def is_concrete(value: Any) -> bool:
