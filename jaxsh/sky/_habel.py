@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 from jaxtyping import Float
 
-from .._core.checks import as_host_float, check_coefficients, check_options, check_type
+from .._core.checks import as_host_float, check_options, check_type
 from ._angles import half_rows
 from ._fit import OPTIONS, fit
 from ._preetham import Constants, preetham_constants, preetham_radiance
@@ -109,11 +109,11 @@ def habel2008_evaluate(
     (2, 3, 4)
     """
     table = as_host_float(table, "table")
-    if table.ndim != 4:
+    if table.ndim != 4 or math.isqrt(len(table)) ** 2 != len(table):
         raise ValueError(
-            f"expected table (K, terms in θ, terms in τ, channels), got shape {table.shape}"
+            "expected table (K, terms in θ, terms in τ, channels) with K = 1, 4, 9, …, got shape "
+            f"{table.shape}"
         )
-    check_coefficients("table.T", table.T)
     theta, turbidity = as_host_float(theta, "theta"), as_host_float(turbidity, "turbidity")
     if theta.ndim != 1 or theta.shape != turbidity.shape:
         raise ValueError(
