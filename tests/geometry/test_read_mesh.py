@@ -1,5 +1,6 @@
 """Mesh files: whole ones, odd ones, damaged ones."""
 
+import re
 import struct
 import warnings
 
@@ -9,6 +10,7 @@ import shapes
 import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mesh_files import corners
 
 from jaxsh.geometry import read_mesh
 
@@ -42,6 +44,31 @@ def test_every_format_gives_the_same_mesh(tmp_path, name):
     assert mesh.vertices.dtype == mesh.normals.dtype == np.float32
     assert mesh.faces.dtype == np.int32
     np.testing.assert_array_equal(read_mesh(str(path), up="z").vertices, mesh.vertices)
+
+
+def test_trimesh_reads_the_same_triangles(tmp_path, rng):
+    """A surface with normals and colors, as trimesh writes and reads it."""
+    known = trimesh.Trimesh(*shapes.sphere(5, 7), process=False)
+    colors = rng.integers(0, 256, (len(known.vertices), 4)).astype(np.uint8)
+    known.visual.vertex_colors = colors
+    value = colors / 255
+    linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    linear[:, 3] = value[:, 3]
+    for name, options in {
+        "a.ply": {"vertex_normal": True},
+        "b.ply": {"vertex_normal": True, "encoding": "ascii"},
+        "a.obj": {"include_normals": True, "include_color": True},
+    }.items():
+        known.export(tmp_path / name, **options)
+        mesh = read_mesh(tmp_path / name)
+        np.testing.assert_allclose(corners(mesh), known.triangles, atol=1e-7)
+        np.testing.assert_allclose(
+            corners(mesh, "normals"), known.vertex_normals[known.faces], atol=1e-6
+        )
+        channels = slice(0, 3 if name.endswith("obj") else 4)
+        found, expected = corners(mesh, "colors"), linear[known.faces]
+        np.testing.assert_allclose(found[..., channels], expected[..., channels], atol=1e-7)
+    assert re.search("vn", (tmp_path / "a.obj").read_text())
 
 
 def test_suffix_may_be_upper_case(tmp_path):
