@@ -2,9 +2,12 @@
 
 import json
 import struct
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from jaxsh.geometry._files._gltf import read_gltf
 
 # A tetrahedron seen from outside, of volume 1/6.
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
@@ -58,3 +61,17 @@ class Gltf:
             data = bytes(self.bytes) + bytes(-len(self.bytes) % 4)
             content += struct.pack("<2I", len(data), 0x004E4942) + data
         return b"glTF" + struct.pack("<2I", 2, 12 + len(content)) + content + tail
+
+
+def read(gltf: Gltf, node: dict | None = None):
+    return read_gltf(Path("a.glb"), gltf.glb(node))
+
+
+def triangles(polygons) -> np.ndarray:
+    assert (polygons.sizes == 3).all()
+    return polygons.positions[polygons.corners].reshape(-1, 3, 3)
+
+
+def volume(polygons) -> float:
+    """Signed: positive where faces are counter-clockwise seen from outside."""
+    return float(np.linalg.det(triangles(polygons)).sum() / 6)
