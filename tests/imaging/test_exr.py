@@ -6,31 +6,10 @@ import numpy as np
 import OpenImageIO as oiio
 import painters
 import pytest
+from picture_writers import save, spec_of
 
 from jaxsh.imaging import read_environment
 from jaxsh.sphere import project_lat_long
-
-
-def spec_of(pixels, names=None, kind="float", **attributes):
-    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
-    if names:
-        spec.channelnames = tuple(names)
-    for key, value in attributes.items():
-        if key == "chromaticities":
-            spec.attribute(key, oiio.TypeDesc("float[8]"), value)
-        elif hasattr(spec, key):
-            setattr(spec, key, value)
-        else:
-            spec.attribute(key.replace("__", ":"), value)
-    return spec
-
-
-def save(path, pixels, names=None, kind="float", **attributes):
-    out = oiio.ImageOutput.create(str(path))
-    assert out.open(str(path), spec_of(pixels, names, kind, **attributes)), out.geterror()
-    assert out.write_image(np.ascontiguousarray(pixels))
-    assert out.close()
-    return path
 
 
 def save_parts(path, parts):
