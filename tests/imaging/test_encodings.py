@@ -110,7 +110,7 @@ def test_exif_orientation_is_applied(tmp_path, rng, orientation):
     Image.fromarray(blocks).save(tmp_path / "a.jpg", exif=exif, quality=100)
     image = read_environment(tmp_path / "a.jpg", encoding="linear")
     expected = np.repeat(TURNED[orientation](blocks)[..., None] / 255, 3, axis=-1)
-    np.testing.assert_allclose(image, expected, atol=1.01 / 255)
+    np.testing.assert_allclose(image, expected, atol=4e-8)
 
 
 def test_floats_are_linear_and_want_no_encoding(tmp_path, pixels):

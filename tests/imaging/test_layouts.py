@@ -136,7 +136,7 @@ def test_height_is_the_readers_choice(tmp_path, rng):
         image = read_environment(path, height=height)
         assert image.shape == (height, 2 * height, 3)
         found = np.einsum("h,hwc->c", row_weights(height), image)
-        np.testing.assert_allclose(found, expected, rtol=2e-3)
+        np.testing.assert_allclose(found, expected, rtol=3e-4)  # 2.0e-4 measured
     np.testing.assert_array_equal(read_environment(path, height=32), picture.astype(np.float32))
 
 
@@ -172,4 +172,4 @@ def test_a_face_goes_on_where_its_neighbor_begins(tmp_path):
     faces[0] = 1
     image = read_environment(save(tmp_path / "a.npy", faces.reshape(96, 16, 3)), layout="cube")
     found = np.einsum("h,hwc->c", row_weights(len(image)), image)
-    np.testing.assert_allclose(found, 4 * np.pi / 6, rtol=2e-3)
+    np.testing.assert_allclose(found, 4 * np.pi / 6, rtol=4e-4)  # 2.9e-4 measured

@@ -163,8 +163,8 @@ def test_xyz_is_converted(tmp_path, rng):
     # Written as R, G, B by another writer, then said to be X, Y, Z.
     path = write_image(tmp_path / "a.hdr", xyz.astype(np.float32))
     path.write_bytes(path.read_bytes().replace(b"_rgbe", b"_xyze"))
-    # Eight bits of the largest, times up to 3.2.
-    np.testing.assert_allclose(read_environment(path), linear, atol=0.03)
+    # Eight bits of the largest, times up to 3.2: 0.011 measured.
+    np.testing.assert_allclose(read_environment(path), linear, atol=0.012)
     assert np.abs(np.asarray(read_environment(path)) - linear).mean() < 0.005
 
 
@@ -300,7 +300,7 @@ def test_what_openimageio_cannot_read(tmp_path, rng, monkeypatch, header, code):
         np.testing.assert_array_equal(image, expected)
     else:  # Y of Rec. 709's weights, which IEC 61966-2-1 prints to four digits
         luminance = image @ np.float32([0.2126, 0.7152, 0.0722])
-        np.testing.assert_allclose(luminance, expected[..., 1], rtol=1e-4)
+        np.testing.assert_allclose(luminance, expected[..., 1], rtol=2e-5)
 
 
 def test_without_openimageio(tmp_path, rng, monkeypatch):

@@ -119,14 +119,14 @@ def test_integers_are_what_their_encoding_says(tmp_path, rng, dtype):
     np.testing.assert_allclose(load(path, "float"), light, atol=4e-8)
     smooth = np.broadcast_to((np.arange(16) * (most // 16)).astype(dtype), (8, 16))
     pixels = load(write_image(tmp_path / "a.jpg", smooth, encoding="srgb"))[..., 0]
-    np.testing.assert_allclose(pixels, smooth / (most / 255), atol=2)
+    np.testing.assert_allclose(pixels, smooth / (most / 255), atol=1)  # 0.47 measured
     # An encoding on its own says nothing of floats.
     with pytest.raises(ValueError, match='encoding="srgb" is for uint8 and uint16, got float64'):
         write_image(path, signal, encoding="srgb")
 
 
 @pytest.mark.parametrize(
-    ("name", "tolerance"), [("a.exr", 0), ("a.hdr", 4e-3), ("a.png", 0), ("a.jpg", 0.05)]
+    ("name", "tolerance"), [("a.exr", 0), ("a.hdr", 2e-3), ("a.png", 0), ("a.jpg", 0.05)]
 )
 def test_what_is_written_is_read(tmp_path, name, tolerance):
     """A display format in 8 bits, by sRGB's curve."""
