@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from jaxsh.imaging import read_environment
+from jaxsh.imaging import read_environment, write_image
 
 
 def light(signal):
@@ -142,6 +142,30 @@ def test_without_an_encoding_the_way_is_named(tmp_path, pixels, name):
         Image.fromarray(pixels[..., :3]).save(tmp_path / name)
     with pytest.raises(ValueError, match=rf'{name}: the picture holds integers.*encoding="srgb"'):
         read_environment(tmp_path / name)
+
+
+def test_a_file_is_read_as_what_it_is_or_not_at_all(tmp_path, pixels):
+    """Codes named .exr would pass for light, and an .hdr is turned by its own reader only."""
+    Image.fromarray(pixels[..., :3]).save(tmp_path / "a.png")
+    data = (tmp_path / "a.png").read_bytes()
+    (tmp_path / "a.jpg").write_bytes(data)
+    check(tmp_path / "a.jpg", pixels[..., :3] / 255)
+    (tmp_path / "a.exr").write_bytes(data)
+    with pytest.raises(ValueError, match=r"a\.exr: not a \.exr file: its bytes are png"):
+        read_environment(tmp_path / "a.exr")
+    for suffix, name in ((".exr", "openexr"), (".hdr", "hdr")):
+        path = write_image(tmp_path / f"b{suffix}", pixels[..., :3] / np.float32(255))
+        with pytest.raises(ValueError, match=rf"b\.tif: not a \.tif file: its bytes are {name}"):
+            read_environment(path.rename(tmp_path / "b.tif"))
+
+
+def test_colors_of_which_no_rgb_is_made_are_refused(tmp_path, pixels):
+    path = tmp_path / "a.tif"
+    Image.fromarray(pixels[..., :3]).convert("CMYK").save(path)
+    check(path, pixels[..., :3] / 255)
+    Image.merge("LAB", Image.fromarray(pixels[..., :3]).split()).save(path)
+    with pytest.raises(ValueError, match=r"a\.tif: its colors are CIELAB, which is not read"):
+        read_environment(path, encoding="srgb")
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".tif"])

@@ -17,6 +17,8 @@ _MAX_NUMBERS_PER_BYTE, _FEW_NUMBERS = 2048, 1 << 25
 _MAX_PIXELS = 1 << 28  # 3 GB of them
 # A picture that is nearly all black by default was damaged more likely than saved so.
 _MAX_FILLED = 64
+# TIFF's black, white and colors of which OpenImageIO makes RGB: not CIELAB, nor logarithms.
+_PHOTOMETRIC = {0, 1, 2, 3, 5, 6}
 _ENVMAPS = {"CubeFace Environment": "cube", "LatLong Environment": "lat-long"}
 
 
@@ -33,7 +35,7 @@ def read_exr(path: Path, layer: str | None, fill: bool) -> Picture:
     The display window is the picture: what the data window has beyond is cut off, and what it has
     not is black where `fill`, else refused. An environment map is all of its data window.
     """
-    source = _open(path)
+    source = _open(path, ("openexr",))
     try:
         parts = _parts(source)
         if all(spec.deep for spec in parts):
@@ -67,9 +69,12 @@ def read_display(path: Path, encoding: str | None) -> Picture:
     EXIF's orientation is applied; alpha, color profiles and gamma in the file are not looked at.
     """
     _check_end(path.read_bytes())
-    source = _open(path)
+    source = _open(path, ("png", "jpeg", "tiff"))
     try:
         spec = source.spec()
+        if spec.get_int_attribute("tiff:PhotometricInterpretation", 2) not in _PHOTOMETRIC:
+            space = spec.getattribute("tiff:ColorSpace") or "of another kind"
+            raise ValueError(f"its colors are {space}, which is not read: save it as RGB")
         _check_size(spec, path)
         channels = choose([(list(spec.channelnames), "")], None).channels
         pixels = _read(source, 0, min(channels), max(channels) + 1, spec.format)
@@ -95,7 +100,8 @@ def refuse_encoding(encoding: str | None) -> None:
         )
 
 
-def _open(path: Path) -> Any:
+def _open(path: Path, formats: tuple[str, ...]) -> Any:
+    """Open a file that is of one of these formats, by OpenImageIO's names, whatever its own."""
     try:
         import OpenImageIO as oiio
     except ImportError as error:
@@ -114,6 +120,8 @@ def _open(path: Path) -> Any:
                 "R, G, B"
             )
         raise ValueError(f"damaged or not a {path.suffix} file: {problem}")
+    if source.format_name() not in formats:
+        raise ValueError(f"not a {path.suffix} file: its bytes are {source.format_name()}")
     return source
 
 
