@@ -129,7 +129,7 @@ def test_the_set_and_the_transform_of_the_texture():
     )
     expected = np.c_[9 * UV, np.ones(4)] @ (move @ turn @ np.diag([2, 3, 1])).T
     expected = expected[:, :2] * [1, -1] + [0, 1]
-    np.testing.assert_allclose(polygons.uv, expected[polygons.corners], atol=1e-6)
+    np.testing.assert_allclose(polygons.uv, expected[polygons.corners], atol=1e-7)
 
 
 @pytest.mark.parametrize("kind", ["f4", "u1", "u2"])

@@ -284,13 +284,13 @@ def test_draco():
     found = polygons.positions[polygons.corners]
     # Draco orders vertices and faces as it likes: corners are known by their positions.
     known = np.array([np.abs(CORNERS - corner).sum(axis=1).argmin() for corner in found])
-    np.testing.assert_allclose(found, CORNERS[known], atol=1e-4)
+    np.testing.assert_allclose(found, CORNERS[known], rtol=0, atol=1e-7)
     assert {tuple(np.roll(f, -f.argmin())) for f in known.reshape(-1, 3)} == {
         tuple(np.roll(f, -f.argmin())) for f in FACES
     }
-    np.testing.assert_allclose(polygons.colors, colors[known] / 255, atol=1e-12)
-    np.testing.assert_allclose(polygons.normals, normals[known], atol=1e-6)
-    np.testing.assert_allclose(polygons.uv, (uv * [1, -1] + [0, 1])[known], atol=1e-6)
+    np.testing.assert_allclose(polygons.colors, colors[known] / 255, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(polygons.normals, normals[known], rtol=0, atol=1e-7)
+    np.testing.assert_allclose(polygons.uv, (uv * [1, -1] + [0, 1])[known], rtol=0, atol=1e-7)
 
 
 def test_draco_without_positions():

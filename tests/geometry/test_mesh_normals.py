@@ -81,10 +81,10 @@ def test_an_angle_rounds_a_cylinder_and_keeps_its_rims():
     assert mesh.vertices.shape == (4 * count + 2, 3)
     found = at_corners(mesh)
     np.testing.assert_allclose(
-        found[2 * count :, :, 2], [[-1] * 3] * count + [[1] * 3] * count, atol=1e-6
+        found[2 * count :, :, 2], [[-1] * 3] * count + [[1] * 3] * count, atol=1e-7
     )
     outward = at_corners(mesh, "vertices")[: 2 * count] * [1, 1, 0]
-    np.testing.assert_allclose(found[: 2 * count], outward, atol=1e-6)
+    np.testing.assert_allclose(found[: 2 * count], outward, rtol=0, atol=1e-7)
     assert topology(mesh).closed
 
 
@@ -146,7 +146,7 @@ def test_a_sphere_far_away_keeps_its_shape(far):
     assert mesh.origin == tuple(map(float, far))
     # In float64 1e-9 is left at 6.4e6, and float32 rounds by 6e-8.
     np.testing.assert_allclose(mesh.vertices, unit, atol=7e-8)
-    np.testing.assert_allclose(mesh.normals, plain.normals, atol=1e-6)
+    np.testing.assert_allclose(mesh.normals, plain.normals, atol=1e-7)
 
 
 def test_an_origin_is_taken_off_only_where_shape_is_lost(tmp_path):

@@ -108,8 +108,8 @@ def test_a_spike_has_no_area(rng, name, offset):
         along = area_vectors(positions, ring[slots]) @ turn[:, 2]
         assert not crossed
         # At 1e5 the spike is 7e-12 wide.
-        np.testing.assert_allclose(along.sum(), area, rtol=1e-9)
-        np.testing.assert_allclose(np.abs(along).sum(), area, rtol=1e-9)
+        np.testing.assert_allclose(along.sum(), area, rtol=2e-11)
+        np.testing.assert_allclose(np.abs(along).sum(), area, rtol=2e-11)
 
 
 def test_random_stars_keep_their_area(rng):
@@ -130,8 +130,8 @@ def test_random_stars_keep_their_area(rng):
     assert crossed == 0
     assert (np.diff(owner) >= 0).all()
     along = area_vectors(positions, slots)[:, 2]
-    np.testing.assert_allclose(np.bincount(owner, along), areas, rtol=1e-9)
-    np.testing.assert_allclose(np.bincount(owner, np.abs(along)), areas, rtol=1e-9)
+    np.testing.assert_allclose(np.bincount(owner, along), areas, rtol=2e-15)
+    np.testing.assert_allclose(np.bincount(owner, np.abs(along)), areas, rtol=2e-15)
 
 
 def test_quads_that_are_not_flat_are_cut_at_the_shorter_diagonal(rng):

@@ -127,7 +127,7 @@ def test_scene_parts_stand_where_the_scene_puts_them(tmp_path):
     assert corners[..., 2].max() == 6
     assert corners[..., 0].min() == -1
     volumes = np.linalg.det(corners - [0, 0, 0]).reshape(2, 4).sum(axis=1) / 6
-    np.testing.assert_allclose(volumes, 1 / 6, rtol=1e-6)
+    np.testing.assert_allclose(volumes, 1 / 6, rtol=1e-14)
 
 
 def test_faults_are_counted_with_the_name_of_the_file(tmp_path):
