@@ -75,8 +75,8 @@ def test_colors_are_linear(kind):
         box.visual.face_colors = np.tile([188, 0, 255, 255], (12, 1))
     mesh = geometry.from_trimesh(box)
     assert mesh.colors is not None
-    # 188 is the code of one half, to 3 in a thousand.
-    np.testing.assert_allclose(mesh.colors, [[0.5029, 0, 1, 1]] * len(mesh.colors), atol=1e-4)
+    red = ((188 / 255 + 0.055) / 1.055) ** 2.4  # sRGB, IEC 61966-2-1
+    np.testing.assert_allclose(mesh.colors, [[red, 0, 1, 1]] * len(mesh.colors), rtol=1e-7)
     codes = geometry.to_trimesh(mesh).visual.vertex_colors
     np.testing.assert_array_equal(codes, [[188, 0, 255, 255]] * len(codes))
 
