@@ -1,6 +1,9 @@
 """Shapes with known answers, for the tests of geometry."""
 
 import numpy as np
+import pytest
+
+from jaxsh.geometry import _cast
 
 TETRAHEDRON = (
     np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32),
@@ -10,6 +13,22 @@ QUAD = (  # the unit square in z = 0, facing +z
     np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32),
     np.array([[0, 1, 2], [0, 2, 3]], np.int32),
 )
+
+
+def small_chunks():
+    """Chunks of 2,048 rays on 256 lanes: less to compile for, and most calls take several.
+
+    For a fixture; all files that use it share the programs.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_cast, "_LANES", {"cpu": 256})
+        patch.setattr(_cast, "_CHUNK", 8)
+        yield
+
+
+def soup(rng) -> np.ndarray:
+    """The corners of 60 triangles anywhere, each with its own: (180, 3)."""
+    return (rng.normal(size=(60, 1, 3)) + 0.5 * rng.normal(size=(60, 3, 3))).reshape(-1, 3)
 
 
 def sphere(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:

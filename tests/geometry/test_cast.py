@@ -12,22 +12,13 @@ from hypothesis import strategies as st
 
 from jaxsh.geometry import EmbreeRayScene, JaxRayScene, Mesh, _cast, knot, make_mesh, trace
 
-
-@pytest.fixture(scope="module", autouse=True)
-def small_chunks():
-    """Chunks of 2,048 rays on 256 lanes: less to compile for, and most calls take several."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_cast, "_LANES", {"cpu": 256})
-        patch.setattr(_cast, "_CHUNK", 8)
-        yield
+small_chunks = pytest.fixture(shapes.small_chunks, scope="module", autouse=True)
 
 
 @pytest.fixture(scope="module")
 def soup():
     """Triangles anywhere, each with its own vertices."""
-    rng = np.random.default_rng(7)
-    vertices = (rng.normal(size=(60, 1, 3)) + 0.5 * rng.normal(size=(60, 3, 3))).reshape(-1, 3)
-    return make_mesh(vertices, np.arange(180).reshape(-1, 3))
+    return make_mesh(shapes.soup(np.random.default_rng(7)), np.arange(180).reshape(-1, 3))
 
 
 @pytest.fixture(scope="module")

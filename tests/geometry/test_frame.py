@@ -8,27 +8,20 @@ import numpy as np
 import pytest
 import shapes
 
-from jaxsh.geometry import EmbreeRayScene, JaxRayScene, Mesh, _cast, trace
+from jaxsh.geometry import EmbreeRayScene, JaxRayScene, Mesh, trace
 from jaxsh.geometry._frame import frame_around, framed
 
 SCENES = [EmbreeRayScene, JaxRayScene]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def small_chunks():
-    """As in the tests of `JaxRayScene`, whose programs serve here too."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_cast, "_LANES", {"cpu": 256})
-        patch.setattr(_cast, "_CHUNK", 8)
-        yield
+small_chunks = pytest.fixture(shapes.small_chunks, scope="module", autouse=True)
 
 
 @pytest.fixture(scope="module")
 def soup():
     """Triangles anywhere, in float64, and rays: origins, directions."""
     rng = np.random.default_rng(7)
-    corners = rng.normal(size=(60, 1, 3)) + 0.5 * rng.normal(size=(60, 3, 3))
-    return corners.reshape(-1, 3), *rng.normal(size=(2, 1000, 3))
+    return shapes.soup(rng), *rng.normal(size=(2, 1000, 3))
 
 
 def mesh_of(vertices, dtype=np.float64) -> Mesh:

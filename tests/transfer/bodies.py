@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsh.geometry import Mesh, make_mesh
-from jaxsh.harmonics import evaluate
+from jaxsh.harmonics import clamped_cosine, convolve, evaluate
 
 
 def sphere(rows: int, columns: int, lowest: float = np.pi) -> tuple[np.ndarray, np.ndarray]:
@@ -61,11 +61,54 @@ def rectangle(corner, u, v) -> Mesh:
     )
 
 
+def rotation(seed: int) -> np.ndarray:
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    return turn * np.linalg.det(turn)
+
+
+def joined(*meshes) -> Mesh:
+    """One mesh of several, with the normals that each has: hard edges between them."""
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    return by_hand(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.faces + int(k) for mesh, k in zip(meshes, first, strict=False)]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+    )
+
+
+def moved(mesh, by, turn=None) -> Mesh:
+    turn = np.eye(3) if turn is None else turn
+    vertices = np.asarray(mesh.vertices, float) @ turn.T + by
+    return by_hand(vertices, mesh.faces, np.asarray(mesh.normals) @ turn.T)
+
+
+def box(low, high) -> Mesh:
+    """Six rectangles, each with its own corners and normals."""
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    sides = np.diag(high - low)
+    return joined(
+        *(
+            rectangle(*where)
+            for u, v in (sides[[0, 1]], sides[[1, 2]], sides[[2, 0]])
+            for where in ((high - u - v, u, v), (low, v, u))
+        )
+    )
+
+
 def bowl(opening: float, rows: int, columns: int) -> Mesh:
     """A spherical cap seen from within, open where θ < `opening`, with the sphere's own normals."""
     vertices, faces = sphere(rows, columns, np.pi - opening)
     vertices = vertices * [1, 1, -1]
     return by_hand(vertices, faces, -vertices)
+
+
+def unshadowed(mesh, degree: int) -> np.ndarray:
+    """λ_l y_lm(n), in blocks of one size: one program for all."""
+    normals = np.asarray(mesh.normals, np.float32)
+    padded = np.zeros((-(-len(normals) // 1024), 1024, 3), np.float32)
+    padded.reshape(-1, 3)[: len(normals)] = normals
+    rows = [convolve(evaluate(block, degree), clamped_cosine(degree)) for block in padded]
+    return np.concatenate(rows)[: len(normals)]
 
 
 def lune(start: float, end: float, degree: int) -> np.ndarray:

@@ -4,7 +4,6 @@ import bodies
 import jax.numpy as jnp
 import numpy as np
 import pytest
-import test_bake_origins as others
 
 from jaxsh.geometry import Mesh, ray_scene
 from jaxsh.transfer import bake
@@ -41,13 +40,13 @@ def check(mesh, blind, reason, **options):
 
 @pytest.mark.parametrize("scale", [1e-18, 1.0, 1e18])
 def test_inside_another_piece(ball, scale):
-    mesh = scaled(others.joined(ball, scaled(ball, 0.3)), scale)
+    mesh = scaled(bodies.joined(ball, scaled(ball, 0.3)), scale)
     check(mesh, COUNT + np.arange(COUNT), f"{COUNT} behind faces of another piece, as inside it")
 
 
 def test_pieces_that_cut_through_each_other(ball):
     """The caps of two spheres that overlap: those of each that are within the other."""
-    mesh = others.joined(ball, others.moved(ball, [0, 0, 1.6]))
+    mesh = bodies.joined(ball, bodies.moved(ball, [0, 0, 1.6]))
     check(mesh, [0, COUNT + 25], "2 behind faces of another piece, as inside it")
 
 
@@ -55,14 +54,14 @@ def test_a_piece_that_folds_through_itself():
     """A flap from the corner (1, 1, 1) of a box on, which comes back in through its side."""
     corners = [[2, 0, 0], [0.1, 0.1, 0], [0.1, -0.1, 0], [1, 1, 1], [3, 1, 2]]
     flap = bodies.by_hand(corners, [[0, 1, 2], [0, 3, 4]], [[0, 0, 1]] * 5)
-    mesh = others.joined(others.box([-1] * 3, [1] * 3), flap)
+    mesh = bodies.joined(bodies.box([-1] * 3, [1] * 3), flap)
     check(mesh, [25, 26], "2 behind faces of their own piece, which folds or cuts through itself")
 
 
 def test_faces_both_ways_round(ball):
     """With corners of their own they see in and out; with the same ones their normals cancel."""
     check(
-        others.joined(ball, turned_in(ball)),
+        bodies.joined(ball, turned_in(ball)),
         COUNT + np.arange(COUNT),
         f"{COUNT} on faces that are there twice, both ways round",
     )
@@ -80,7 +79,7 @@ def test_pieces_inside_out(ball):
     """Wound inwards, or wound outwards with normals that point in."""
     reason = f"{COUNT} on a closed piece whose faces point inwards"
     check(
-        others.joined(others.moved(ball, [9, 0, 0]), turned_in(ball)),
+        bodies.joined(bodies.moved(ball, [9, 0, 0]), turned_in(ball)),
         COUNT + np.arange(COUNT),
         reason,
     )
@@ -91,7 +90,7 @@ def test_pieces_inside_out(ball):
 
 def test_a_cavity(ball):
     """A small ball in a room: both see each other only."""
-    mesh = others.joined(scaled(ball, 0.3), turned_in(ball))
+    mesh = bodies.joined(scaled(ball, 0.3), turned_in(ball))
     reason = (
         f"{COUNT} shut in by the fronts of faces, as in a cavity, "
         f"{COUNT} on a closed piece whose faces point inwards"
@@ -113,7 +112,7 @@ def test_many_are_estimated(ball, monkeypatch):
     from jaxsh.transfer._bake import _blind
 
     monkeypatch.setattr(_blind, "_MOST", 13)
-    mesh = others.joined(ball, scaled(ball, 0.3))
+    mesh = bodies.joined(ball, scaled(ball, 0.3))
     check(mesh, COUNT + np.arange(COUNT), f"about {COUNT} behind faces of another piece.*")
 
 
@@ -122,4 +121,4 @@ def test_nothing_is_asked_where_all_see_something(ball, monkeypatch):
 
     monkeypatch.setattr(_bake, "why_blind", None)
     got = bake(ball, 4, directions=256, progress=False).coefficients
-    np.testing.assert_allclose(got, others.unshadowed(ball), atol=3e-7)
+    np.testing.assert_allclose(got, bodies.unshadowed(ball, 4), atol=3e-7)

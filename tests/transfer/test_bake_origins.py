@@ -6,6 +6,7 @@ import bodies
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from bodies import box, joined, moved, rotation, unshadowed
 
 from jaxsh.geometry import (
     EmbreeRayScene,
@@ -16,7 +17,6 @@ from jaxsh.geometry import (
     ray_scene,
     vertex_normals,
 )
-from jaxsh.harmonics import clamped_cosine, convolve, evaluate
 from jaxsh.transfer import bake
 
 DEGREE, RAYS = 4, 256  # of all bakes here: each other pair compiles anew
@@ -30,44 +30,6 @@ def baked(mesh, **options):
 def irradiance(mesh, **options):
     """Under a uniform sky, as a share of π."""
     return baked(mesh, **options)[:, 0] * np.sqrt(4 * np.pi) / np.pi
-
-
-def unshadowed(mesh):
-    """λ_l y_lm(n), in blocks of one size: one program for all."""
-    normals = np.asarray(mesh.normals, np.float32)
-    padded = np.zeros((-(-len(normals) // 1024), 1024, 3), np.float32)
-    padded.reshape(-1, 3)[: len(normals)] = normals
-    rows = [convolve(evaluate(block, DEGREE), clamped_cosine(DEGREE)) for block in padded]
-    return np.concatenate(rows)[: len(normals)]
-
-
-def joined(*meshes) -> Mesh:
-    """One mesh of several, with the normals that each has: hard edges between them."""
-    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    return bodies.by_hand(
-        np.concatenate([mesh.vertices for mesh in meshes]),
-        np.concatenate([mesh.faces + int(k) for mesh, k in zip(meshes, first, strict=False)]),
-        np.concatenate([mesh.normals for mesh in meshes]),
-    )
-
-
-def moved(mesh, by, turn=None) -> Mesh:
-    turn = np.eye(3) if turn is None else turn
-    vertices = np.asarray(mesh.vertices, float) @ turn.T + by
-    return bodies.by_hand(vertices, mesh.faces, np.asarray(mesh.normals) @ turn.T)
-
-
-def box(low, high) -> Mesh:
-    """Six rectangles, each with its own corners and normals."""
-    low, high = np.asarray(low, float), np.asarray(high, float)
-    sides = np.diag(high - low)
-    return joined(
-        *(
-            bodies.rectangle(*where)
-            for u, v in (sides[[0, 1]], sides[[1, 2]], sides[[2, 0]])
-            for where in ((high - u - v, u, v), (low, v, u))
-        )
-    )
 
 
 def ground(half: float) -> Mesh:
@@ -88,13 +50,15 @@ def test_a_sphere_far_away_sees_everything(sphere, distance):
     mesh = moved(sphere, [distance, distance, 0])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)  # 1.3e-7 measured
+        np.testing.assert_allclose(
+            baked(mesh), unshadowed(mesh, DEGREE), atol=3e-7
+        )  # 1.3e-7 measured
 
 
 @pytest.mark.parametrize("scale", [1e-40, 1e-30, 1e-18, 1e18, 1e30])
 def test_a_sphere_of_any_size_sees_everything(sphere, scale):
     mesh = Mesh(sphere.vertices * np.float32(scale), sphere.faces, sphere.normals)
-    np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)
+    np.testing.assert_allclose(baked(mesh), unshadowed(mesh, DEGREE), atol=3e-7)
 
 
 @pytest.mark.parametrize(
@@ -120,14 +84,14 @@ def test_a_body_with_shadows_has_the_same_anywhere(kind):
 def test_a_sphere_in_doubles_sees_everything_anywhere(sphere):
     vertices, normals = (jnp.asarray(x, float) for x in (sphere.vertices, sphere.normals))
     mesh = Mesh(1e-3 * vertices + 1e7, sphere.faces, normals)
-    np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)
+    np.testing.assert_allclose(baked(mesh), unshadowed(mesh, DEGREE), atol=3e-7)
 
 
 @pytest.mark.parametrize("scale", [1e-310, 1e-200, 1e200, 4e307])
 def test_a_sphere_in_doubles_of_any_size_sees_everything(sphere, scale):
     vertices, normals = (jnp.asarray(x, float) for x in (sphere.vertices, sphere.normals))
     mesh = Mesh(jnp.asarray(np.asarray(vertices) * scale), sphere.faces, normals)
-    np.testing.assert_allclose(baked(mesh), unshadowed(mesh), atol=3e-7)
+    np.testing.assert_allclose(baked(mesh), unshadowed(mesh, DEGREE), atol=3e-7)
 
 
 def test_what_coordinates_lose_is_said():
@@ -176,8 +140,7 @@ def test_a_chosen_offset_may_be_too_large_and_is_said():
 
 def test_an_offset_below_rounding_is_raised_to_it():
     """Alone on a surface, tilted, with an offset of nothing: not shadowed by the surface itself."""
-    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    turn *= np.linalg.det(turn)
+    turn = rotation(0)
     sheet = moved(ground(1), [30, 20, 10], turn)
     np.testing.assert_allclose(irradiance(sheet, offset=1e-12), 1, atol=1e-6)
     one = bodies.points(np.asarray(sheet.vertices)[4:], np.asarray(sheet.normals)[4:])
@@ -194,10 +157,9 @@ def test_small_parts_of_a_large_mesh_keep_their_shadows():
 
 
 def test_cubes_with_hard_edges_see_the_whole_sky():
-    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-    turn *= np.linalg.det(turn)
+    turn = rotation(1)
     for cube in (box([-1] * 3, [1] * 3), moved(box([-1] * 3, [1] * 3), [3, 2, 1], turn)):
-        np.testing.assert_allclose(baked(cube), unshadowed(cube), atol=3e-7)
+        np.testing.assert_allclose(baked(cube), unshadowed(cube, DEGREE), atol=3e-7)
 
 
 def test_rooms_with_hard_edges_let_no_light_through():
@@ -206,8 +168,7 @@ def test_rooms_with_hard_edges_let_no_light_through():
         bodies.rectangle([0, 0, 0], *sides)
         for sides in (np.eye(3)[[0, 1]], np.eye(3)[[1, 2]], np.eye(3)[[2, 0]])
     ]
-    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
-    turn *= np.linalg.det(turn)
+    turn = rotation(2)
     for room in (joined(*walls), moved(joined(*walls), [0.3, 0.2, 0.1], turn)):
         got = irradiance(room).reshape(3, 4)[:, 0]
         np.testing.assert_allclose(got, 1 / 4, atol=5e-3)  # 3e-3 measured
