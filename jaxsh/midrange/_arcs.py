@@ -51,11 +51,12 @@ class Arcs(NamedTuple):
 
 
 def edge_arcs(first: Vectors, second: Vectors, point: Vectors) -> Arcs:
-    """The arcs of edges between corners: normal s×e/|s×e|, line f/|f|² with f the line's foot.
+    """The arcs of edges from s to e, seen from the receiver: normal s×e/|s×e|, line f/|f|².
 
+       f is the foot of the receiver on the edge's line.
     Both are zero for an edge that points at the receiver or has no length. In float32 they are
-    right to rounding down to |f| = 1e-4 of the distance of the corners: what the differences
-    leave counts, since s and e are almost parallel there.
+       right to rounding down to |f| = 1e-4 of the distance of the corners: what the differences
+       leave counts, since s and e are almost parallel there.
     """
     # Stored, since each component of what follows takes all of it.
     start, end, along, area = materialize(_between, first, second, point)
@@ -110,7 +111,7 @@ def coefficients(
             flux = flux + normal[:, None] * integral[None]
         return flux, angle + _angle(triangle)
 
-    spans, triangles = materialize(_spans, arcs, apex)
+    spans, triangles = materialize(_spans_and_triangles, arcs, apex)
     nothing = _nothing(arcs.start, 3, degree**2), _nothing(arcs.start)
     flux, angle = _sum(add_arc, nothing, (spans, arcs.normal, triangles), active)
     return _from_flux(flux, angle, degree)
@@ -139,7 +140,7 @@ def _rate(arcs: Arcs, moves: Arcs, active: Array | None, degree: int):
         return total + _integrate_odd(_basis(nodes, degree), _times(weights, nodes, speed))
 
     nothing = _nothing(start, (degree + 1) ** 2)
-    return _sum(add_arc, nothing, (_spans(arcs)[0], speed), active)
+    return _sum(add_arc, nothing, (_spans(arcs), speed), active)
 
 
 def coefficients_with_gradient(
@@ -161,7 +162,7 @@ def coefficients_with_gradient(
 
     shapes = (3, lower), (3, (degree + 1) ** 2), ()
     nothing = tuple(_nothing(arcs.start, *shape) for shape in shapes)
-    spans, triangles = materialize(_spans, arcs, apex)
+    spans, triangles = materialize(_spans_and_triangles, arcs, apex)
     each = spans, arcs.normal, arcs.near, triangles
     flux, pull, angle = _sum(add_arc, nothing, each, active)
     return _from_flux(flux, angle, degree), -pull
@@ -186,7 +187,7 @@ def _sum(add_arc, total, arcs, active: Bool[Array, " arcs"] | None):
     return jax.lax.scan(add, total, (arcs, active))[0]
 
 
-Complex = tuple[Array, Array]
+Pair = tuple[Array, Array]  # of a complex number, or of weights for even and odd integrands
 
 
 def _nothing(start: Rows, *shape: int) -> Array:
@@ -194,7 +195,7 @@ def _nothing(start: Rows, *shape: int) -> Array:
     return varying_as(jnp.zeros((*shape, start.shape[-1]), start.dtype), start)
 
 
-def _angle(triangle: Complex) -> Float[Array, " n"]:
+def _angle(triangle: Pair) -> Float[Array, " n"]:
     """The solid angle of an arc's triangle, in [-π, π] as no corner is beyond π/2 of the apex."""
     x, y = triangle  # both zero for a receiver on the edge
     return 2 * jnp.arctan2(y, jnp.where((x == 0) & (y == 0), 1, x))
@@ -209,10 +210,17 @@ class _Spans(NamedTuple):
     cosine: Float[Array, "*arcs n"]
 
 
-def _spans(arcs: Arcs, apex: Float[Array, "3 n"] | None = None) -> tuple[_Spans, Complex]:
-    """Arcs by their middles, and the complex numbers of eq. (2) of their triangles (apex, a, b).
+def _spans_and_triangles(arcs: Arcs, apex: Float[Array, "3 n"]) -> tuple[_Spans, Pair]:
+    """Arcs by their middles, and the complex numbers of eq. (2) of their triangles (apex, a, b)."""
+    spans, apex = _spans(arcs), apex[None]
+    real = dot(apex, spans.middle) + spans.cosine
+    return spans, (real, -dot(apex, arcs.normal) * spans.sine)
 
-    The middle is along a + b for arcs below π/2; above, b - a along the tangent has the digits.
+
+def _spans(arcs: Arcs) -> _Spans:
+    """Arcs by their middles.
+
+    A middle is along a + b for arcs below π/2; above, b - a along the tangent has the digits.
     """
     start, end, normal = arcs.start, arcs.end, arcs.normal
     inverse_start, inverse_end = inverse_length(start), inverse_length(end)
@@ -232,14 +240,10 @@ def _spans(arcs: Arcs, apex: Float[Array, "3 n"] | None = None) -> tuple[_Spans,
     sine = jnp.where(wide, larger, smaller)
     # Zero for an arc of no length: a receiver on the edge.
     cosine = jnp.where(inverse == 0, 1, jnp.where(wide, smaller, larger))
-    spans = _Spans(middle, tangent, sine, cosine)
-    if apex is None:
-        return spans, (cosine, sine)
-    apex = apex[None]
-    return spans, (dot(apex, middle) + cosine, -dot(apex, normal) * sine)
+    return _Spans(middle, tangent, sine, cosine)
 
 
-def _nodes(count: int, span: _Spans) -> tuple[Float[Array, "3 count n"], Complex]:
+def _nodes(count: int, span: _Spans) -> tuple[Float[Array, "3 count n"], Pair]:
     """Nodes on an arc's great circle, and their weights for even and for odd integrands.
 
     Exact up to degree count - 1, eq. (3).
@@ -270,7 +274,7 @@ def _sloped_nodes(count: int, span: _Spans, slope: Float[Array, "3 n"]):
     return nodes, weights, _times(weights, nodes, slope)
 
 
-def _times(weights: Complex, nodes: Float[Array, "3 j n"], slope: Float[Array, "3 n"]) -> Complex:
+def _times(weights: Pair, nodes: Float[Array, "3 j n"], slope: Float[Array, "3 n"]) -> Pair:
     """The weights times slope·ω at each node."""
     x, y, z = nodes
     value = slope[0][None] * x + slope[1][None] * y + slope[2][None] * z
@@ -283,24 +287,24 @@ def _basis(nodes: Float[Array, "3 j n"], degree: int) -> Float[Array, "k j n"]:
     return materialize(lambda rows: evaluate(jnp.moveaxis(rows, 0, -1), degree, axis=0), nodes)
 
 
-def _integrate_even(basis: Array, weights: tuple[Array, Array]) -> Float[Array, "k n"]:
+def _integrate_even(basis: Array, weights: Pair) -> Float[Array, "k n"]:
     """∫ y_k dt: integrands of the parity of l."""
     return _integrate(basis, weights, 0)
 
 
-def _integrate_odd(basis: Array, weights: tuple[Array, Array]) -> Float[Array, "k n"]:
+def _integrate_odd(basis: Array, weights: Pair) -> Float[Array, "k n"]:
     """∫ y_k (slope·ω) dt: integrands of the parity of l + 1."""
     return _integrate(basis, weights, 1)
 
 
-def _integrate_both(basis: Float[Array, "k j n"], weights: Complex, slopes: Complex):
+def _integrate_both(basis: Float[Array, "k j n"], weights: Pair, slopes: Pair):
     """∫ y_k (slope·ω) dt, and ∫ y_k dt for all degrees but the last."""
     lower = (round(len(basis) ** 0.5) - 1) ** 2
     odd = _integrate_odd(basis, slopes)
     return (odd, _integrate_even(basis[:lower], weights)) if lower else (odd,)
 
 
-def _integrate(basis: Array, weights: tuple[Array, Array], parity: int) -> Float[Array, "k n"]:
+def _integrate(basis: Array, weights: Pair, parity: int) -> Float[Array, "k n"]:
     l = degrees(round(len(basis) ** 0.5) - 1)
     odd = ((l + parity) % 2).astype(bool)[:, None]
     total = jnp.zeros_like(basis[:, 0])

@@ -114,7 +114,7 @@ def within(
 
 
 def left_over(base: tuple[Number, Number], taken: tuple[Number, Number]) -> tuple[Number, Number]:
-    """Find what intervals (c, *any) that may overlap leave of one (*any): c + 1, or fewer.
+    """Find what intervals (c, *any) that may overlap leave of one (*any): c + 1, some empty.
 
     They begin where the base does or where one ends that is `taken`, and reach to where the next
     begins; those that do not begin there, because another covers it, are empty.

@@ -98,9 +98,10 @@ def test_lights_that_are_partly_hidden():
         exact_c = visible(light, radiance, blocker, point, 4)
         errors.append([relative(c, exact_c), relative(surface, exact), relative(edge, exact)])
     c, surface, edge = np.median(errors, axis=0)
-    assert c < 0.02
-    assert edge < 0.04
-    assert surface > 0.3
+    # 0.7, 2.5 and 65 % measured.
+    assert c < 0.008
+    assert edge < 0.03
+    assert surface > 0.6
 
 
 def project_both(cube):
