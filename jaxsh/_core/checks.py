@@ -206,6 +206,15 @@ def check_all(name: str, values: Any, *classes: type, least: int = 1) -> None:
             raise TypeError(f"expected {name} as all of {wanted}, got {described(value)}")
 
 
+def check_faces(whose: str, faces: np.ndarray, count: int) -> None:
+    """Raises `ValueError` where faces name other vertices than 0 to `count` - 1."""
+    if faces.size and not 0 <= faces.min() <= faces.max() < count:
+        raise ValueError(
+            f"faces of {whose} name vertices {faces.min()} to {faces.max()}, but it has 0 to "
+            f"{count - 1}"
+        )
+
+
 def check_function(name: str, value: Any) -> None:
     """Raises `TypeError` unless a value can be called."""
     if not callable(value):

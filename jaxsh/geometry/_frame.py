@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from .._core.checks import check_faces
 from ._mesh import Mesh
 
 # Sizes that are cast as they are. Tests of triangles multiply three lengths, so that float32 holds
@@ -133,12 +134,7 @@ def framed(meshes: Sequence[Mesh]) -> tuple[list[np.ndarray], list[np.ndarray], 
         faces.append(np.ascontiguousarray(mesh.faces, np.int32))
         if not faces[-1].size:
             continue
-        first, last = int(faces[-1].min()), int(faces[-1].max())
-        if first < 0 or last >= len(vertices):
-            raise ValueError(
-                f"faces of mesh {number} name vertices {first} to {last}, but it has 0 to "
-                f"{len(vertices) - 1}"
-            )
+        check_faces(f"mesh {number}", faces[-1], len(vertices))
         used = np.zeros(len(vertices), bool)
         used[faces[-1].reshape(-1)] = True
         used &= np.isfinite(points[-1]).all(axis=1)

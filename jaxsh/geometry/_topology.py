@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int
 
-from .._core.checks import check_type
+from .._core.checks import check_faces, check_type
 from ._indices import first_of_equals, groups, ranges
 from ._mesh import Mesh
 
@@ -177,11 +177,7 @@ def _joined(mesh: Mesh, faces: np.ndarray) -> np.ndarray:
     """Name for each vertex in a face the first such at its position; the others name themselves."""
     vertices = np.asarray(mesh.vertices)
     vertices = vertices.astype(np.promote_types(vertices.dtype, np.float32))
-    if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
-        raise ValueError(
-            f"faces of the mesh name vertices {faces.min()} to {faces.max()}, but it has 0 to "
-            f"{len(vertices) - 1}"
-        )
+    check_faces("the mesh", faces, len(vertices))
     used = np.zeros(len(vertices), bool)
     used[faces] = True
     at = np.flatnonzero(used)

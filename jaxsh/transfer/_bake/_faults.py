@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from ..._core.checks import (
     as_host_float,
     as_host_integer,
+    check_faces,
     check_finite,
     check_flag,
     check_number,
@@ -43,11 +44,7 @@ def check_arguments(
         raise ValueError("the mesh has no vertices")
     if bad := int((~np.isfinite(vertices).all(axis=1)).sum()):
         raise ValueError(f"the mesh has {bad} NaN or infinite vertices; make_mesh drops such")
-    if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
-        raise ValueError(
-            f"faces of the mesh name vertices {faces.min()} to {faces.max()}, but it has 0 to "
-            f"{len(vertices) - 1}"
-        )
+    check_faces("the mesh", faces, len(vertices))
     check_size("directions", directions)
     check_size("bounces", bounces, least=0)
     check_size("chunk", chunk)
