@@ -30,7 +30,7 @@ class JaxRayScene:
     Positions, directions and distances are float32 within, in a frame of the meshes' own as
     `EmbreeRayScene` has it, and agree with Embree's to rounding; a ray through an edge may name
     either of its faces, and one that passes an edge within rounding (4e-7 of the distance) may hit
-    it, 2 of 1.6 million that graze a surface.
+    it.
 
     On a CPU slower than Embree, which is made for it. The first query compiles, once for each
     power of two of the number of faces; no number of rays compiles anew. Memory is bounded, for

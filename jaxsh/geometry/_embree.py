@@ -74,8 +74,8 @@ class EmbreeRayScene:
 
     In Embree's robust mode. It lets a very few rays slip through exactly at an edge or a vertex
     (`JaxRayScene` lets none), and lets some rays that pass an edge within rounding (4e-7 of the
-    distance) hit what they miss, more often than `JaxRayScene` does: of 1.6 million rays that
-    graze a surface about 15, against 2.
+    distance) hit what they miss: of rays aimed within 3e-6 of the rim of a square it takes 2 %
+    for what they are not, `JaxRayScene` 0.5 % (tests/geometry/test_cast.py).
 
     A ray that starts on a surface may hit it: start it a little off, along the normal.
     Answers do not depend on the number of threads or on how rays are cut into chunks. Runs on the

@@ -145,9 +145,11 @@ def cast(
     apart: bool = False,
 ) -> Trace:
     """Cast float32 rays that are in the tree's frame, with directions of about unit length."""
-    one = _cast_apart if apart else _cast_in_lanes
     end = jnp.asarray(count, jnp.int32)
-    return one(tree, origins, directions, limits, end, first=first, lanes=min(lanes, len(origins)))
+    if apart:
+        return _cast_apart(tree, origins, directions, limits, end, first)
+    lanes = min(lanes, len(origins))
+    return _cast_in_lanes(tree, origins, directions, limits, end, first, lanes)
 
 
 def _power_of_two(x: Float[Array, " n"]) -> Float[Array, " n"]:
@@ -158,7 +160,7 @@ def _power_of_two(x: Float[Array, " n"]) -> Float[Array, " n"]:
 
 
 def _cast_in_lanes(
-    tree: RayTree, origins, directions, limits, end, *, first: bool | Array, lanes: int
+    tree: RayTree, origins, directions, limits, end, first: bool | Array, lanes: int
 ) -> Trace:
     """Cast rays in lanes that take the next ray when they are through."""
     size = len(origins)
@@ -206,11 +208,8 @@ def _cast_in_lanes(
     return _met(tree, rays, refill(last).found)
 
 
-def _cast_apart(
-    tree: RayTree, origins, directions, limits, end, *, first: bool | Array, lanes: int
-) -> Trace:
+def _cast_apart(tree: RayTree, origins, directions, limits, end, first: bool | Array) -> Trace:
     """Cast each ray in a lane of its own, so that rays may be shared out between devices."""
-    del lanes
     rays = jnp.concatenate([origins, directions], axis=1)
     # Made of the rays, so that in `shard_map` each array varies over the devices as they do.
     zero = ((rays[:, 0] > 0) & False).astype(jnp.int32)

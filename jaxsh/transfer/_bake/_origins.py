@@ -8,8 +8,8 @@ from jaxtyping import Bool, Float, Int
 
 from ...geometry import Mesh, RayScene
 
-# In half-extents of the mesh. Against 3e-7, on seven scanned meshes, the coefficients' RMS error
-# is 0.02 to 0.7 %; 1e-4 makes 0.07 to 1.6 %, and no fewer vertices black that should not be.
+# In half-extents of the mesh. Against `ray_bias=3e-7` the coefficients at degree 10 and 2,048
+# directions change by 0.02 to 0.15 % (RMS, seven scanned meshes); `ray_bias=1e-4` by 0.05 to 1.5 %.
 _SHARE = 1e-5
 # What a vertex's shortest edge allows, so that small parts of a large mesh keep their shadows.
 _OF_EDGE = 1e-3
