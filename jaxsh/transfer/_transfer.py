@@ -14,8 +14,8 @@ from .._core.checks import (
     as_integer,
     check_coefficients,
     check_degree,
+    check_finite,
     check_type,
-    is_concrete,
 )
 from .._core.linalg import matmul, tall_product
 from .._core.xla import materialize, on_mesh
@@ -328,11 +328,7 @@ def quantize(transfer: Transfer) -> QuantizedTransfer:
     """
     check_type("transfer", transfer, Transfer)
     rows = transfer.coefficients
-    if is_concrete(rows):
-        with jax.ensure_compile_time_eval():  # known values inside `jit`, too
-            finite = bool(jnp.isfinite(rows).all())
-        if not finite:
-            raise ValueError("expected coefficients that are finite everywhere")
+    check_finite("coefficients", rows, wait=True)
     codes, scales = in_steps(rows, 0)
     count, width = rows.shape
     # On a mesh of devices a single block, whose points stay sharded as they are.

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import as_float, as_integer, check_degree
+from .._core.checks import as_float, check_degree
 from ..harmonics import convolve, evaluate, phong
 from ._transfer import Transfer
 
@@ -59,9 +59,6 @@ def unshadowed(
     if neighbors is None:
         # Each point beside itself alone, which is how the table is filled up.
         neighbors = jnp.arange(len(normals), dtype=jnp.int32)[:, None]
-    neighbors = as_integer(neighbors, "neighbors")
-    if neighbors.ndim != 2 or len(neighbors) != len(normals):
-        raise ValueError(f"expected neighbors ({len(normals)}, n), got shape {neighbors.shape}")
     positions = positions.astype(normals.dtype)
     return Transfer(_coefficients(normals, degree), positions, normals, neighbors)
 
