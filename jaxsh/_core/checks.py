@@ -115,7 +115,7 @@ def check_finite(name: str, value: Any, *, least: float | None = None, wait: boo
         last = _right.get((name, least))
         if last is not None and last() is value:
             return
-        if not (is_concrete(value) if wait else _at_hand(value)):
+        if not (is_concrete(value) if wait else at_hand(value)):
             return
     array = np.asarray(value)
     if array.size > _FEW and not wait:
@@ -147,7 +147,8 @@ def is_concrete(value: Any) -> bool:
     return not isinstance(value, jax.Array) or value.is_fully_addressable
 
 
-def _at_hand(array: Array) -> bool:
+def at_hand(array: Array) -> bool:
+    """True where an array can be looked at and is on a CPU."""
     return is_concrete(array) and next(iter(array.devices())).platform == "cpu"
 
 

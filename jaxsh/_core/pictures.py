@@ -9,10 +9,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from .checks import check_finite, is_concrete, said_dtype
+from .checks import at_hand, check_finite, said_dtype
 
 
 def as_radiance(name: str, value: Any) -> Float[Array, "..."]:
@@ -62,7 +61,7 @@ def check_shape(name: str, shape: tuple[int, ...], *, lat_long: bool = False) ->
 
 def check_values(name: str, picture: Array) -> None:
     """Refuse NaN and infinities of a picture at hand on a CPU, at which it looks once."""
-    if is_concrete(picture) and next(iter(picture.devices())).platform == "cpu":
+    if at_hand(picture):
         check_finite(name, picture, wait=True)
 
 
@@ -71,15 +70,8 @@ def check_result(name: str, picture: Array, result: Array) -> None:
 
     The sums are few and the picture is large: only where they are not finite is it looked at.
     """
-    if isinstance(result, Tracer) or not result.is_fully_addressable:
-        return
-    if next(iter(result.devices())).platform != "cpu" or np.isfinite(np.asarray(result)).all():
-        return
-    if isinstance(picture, Tracer):
-        return
-    wrong = int((~np.isfinite(np.asarray(picture))).sum())
-    if wrong:
-        raise ValueError(f"{name} must be finite, got {wrong} of {picture.size} values NaN or inf")
+    if at_hand(result) and not np.isfinite(np.asarray(result)).all():
+        check_finite(name, picture, wait=True)
 
 
 def _channels_first(shape: tuple[int, ...]) -> bool:

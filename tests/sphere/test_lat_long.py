@@ -181,7 +181,7 @@ def test_bad_input_is_refused(unchecked):
     for value in (np.nan, np.inf):
         image = np.ones((9, 18, 3))
         image[4, 4, 1] = image[5, 5, 2] = value
-        with pytest.raises(ValueError, match="image must be finite, got 2 of 486 values"):
+        with pytest.raises(ValueError, match=f"image must be finite, got {value} in 2 of 486"):
             sphere.project_lat_long(image, 2)
         assert not np.isfinite(jax.jit(sphere.project_lat_long, static_argnums=1)(image, 2)).all()
     with pytest.raises(ValueError, match=r"degree must be an integer >= 0.*got -1"):
