@@ -23,7 +23,16 @@ REASONS = {
         "write_mesh": NO_ARRAYS,
     },
     "harmonics": dict.fromkeys(
-        ["degree_of", "degrees", "gaunt", "index", "num_coefficients", "orders", "window"],
+        [
+            "conventions",
+            "degree_of",
+            "degrees",
+            "gaunt",
+            "index",
+            "num_coefficients",
+            "orders",
+            "window",
+        ],
         NO_ARRAYS,
     )
     | {"legendre": HOST},

@@ -1,10 +1,12 @@
-"""Real spherical harmonics: the basis and its gradient, rotation, products, kernels, windows.
+"""Real spherical harmonics: the basis, rotation, products, kernels, windows, conventions.
 
 Orthonormal, no Condon–Shortley phase, index i = l(l+1) + m, coefficients on the last axis. A
 function of degree L has K = (L+1)² coefficients. Directions are x, y, z.
 """
 
 from ._basis import evaluate, evaluate_with_gradient
+from ._convention import Convention, conventions
+from ._convert import convert
 from ._dering import dering
 from ._indexing import degree_of, degrees, index, num_coefficients, orders
 from ._products import gaunt, product, product_matrix, triple_integral
@@ -14,7 +16,10 @@ from ._windows import damping, window
 from ._zonal import clamped_cosine, convolve, phong
 
 __all__ = [
+    "Convention",
     "clamped_cosine",
+    "conventions",
+    "convert",
     "convolve",
     "damping",
     "degree_of",

@@ -76,6 +76,19 @@ def test_products_and_kernels(rng):
     check_sharded(everything, (f, g, exponents), (ROWS, ROWS, ROWS), ROWS)
 
 
+def test_conversions(rng):
+    def everything(light):
+        splats = harmonics.convert(light, "jaxsh", "gaussian-splatting")
+        return (
+            splats,
+            harmonics.convert(splats, "gaussian-splatting", "e3nn-norm"),
+            harmonics.convert(light, "jaxsh", "unity"),
+            harmonics.convert(light, "jaxsh", "pyshtools-4pi"),
+        )
+
+    check_sharded(everything, (rng.normal(size=(COUNT, 3, 9)),), (ROWS,), ROWS)
+
+
 def test_a_large_product_is_one_call(rng):
     """Where one device would take blocks; with a second axis in front, too."""
     f, g = rng.normal(size=(2, 1030, 4)), rng.normal(size=(1030, 4))

@@ -12,6 +12,22 @@ def calls():
     f, vectors = floats(2, K), floats(5, 3)
     return {
         "clamped_cosine": of(h.clamped_cosine, degree=2),
+        "Convention": of(
+            h.Convention,
+            phase="none",
+            order="ascending",
+            normalization="orthonormal",
+            basis_axes="xyz",
+            axes="y-up",
+            layout="coefficients-last",
+            quantity="radiance",
+            degree=2,
+            about="",
+            host=True,
+            free="about degree order axes",
+        ),
+        "conventions": of(h.conventions),
+        "convert": of(h.convert, coefficients=f, source="jaxsh", target="e3nn-norm"),
         "convolve": of(h.convolve, coefficients=f, zonal=floats(3)),
         "damping": of(h.damping, strength=floats(), degree=2),
         "degree_of": of(h.degree_of, count=9),

@@ -1,0 +1,307 @@
+"""Conventions of spherical-harmonic coefficients: a few facts each, and the table of names."""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from .._core.checks import check_choice, check_degree, check_type, described, nearest
+from ._indexing import degrees, num_coefficients, orders
+
+PHASES = "none", "condon-shortley"
+ORDERS = "ascending", "descending"
+NORMALIZATIONS = "orthonormal", "4pi", "schmidt", "unnormalized", "polynomial"
+LAYOUTS = "coefficients-last", "channels-last", "by-channel", "by-coefficient", "cosine-sine"
+QUANTITIES = "radiance", "irradiance", "irradiance/pi"
+_UP = {"z-up": ("+x", "+y", "+z"), "y-up": ("+x", "+z", "-y")}
+_OWN = _UP["z-up"]
+
+Axes = tuple[str, str, str]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Convention:
+    """States what coefficients mean: a handful of facts, jaxsh's own unless said otherwise.
+
+    A function of the directions p of a package is f(p) = Σ c_lm b_lm(B p), with its basis b and the
+    axes B that the basis reads. `conventions` lists known ones; `dataclasses.replace` changes a
+    fact.
+
+    **Arguments**
+
+    - `phase`: `"none"`, or `"condon-shortley"`: b_lm has the sign (-1)^m of ours.
+    - `order`: of m within a degree, `"ascending"` from -l to l or `"descending"`, or all (l, m) in
+      their order. Sines are m < 0.
+    - `normalization`: of the basis. `"orthonormal"`; `"4pi"`: ∫ b² = 4π (geodesy; e3nn's
+      component); `"schmidt"`: 4π/(2l+1) (e3nn's norm); `"unnormalized"`: P_lm(cos θ) times cos mφ
+      or sin |m|φ; `"polynomial"`: 1, y, z, x, xy, yz, 3z²-1, xz, x²-y², with the constants in the
+      coefficients.
+    - `basis_axes`: which of the package's coordinates its basis takes for x, y and z, as `"xyz"`;
+      the last is the polar axis. e3nn's is `"zxy"`.
+    - `axes`: where the package's x, y and z axis lie in ours, as `("+x", "+z", "-y")`; or `"y-up"`,
+      which is that, as for meshes, or `"z-up"`. Mirrored, left-handed ones are good as well.
+    - `layout`: `"coefficients-last"` (..., K); `"channels-last"` (..., K, C); `"by-channel"`
+      (..., 3K), all of red first; `"by-coefficient"` (..., 3K), the three of the constant first;
+      `"cosine-sine"` (..., 2, L+1, L+1), [0, l, m] the cosines and [1, l, m] the sines.
+    - `quantity`: `"radiance"`, `"irradiance"` or `"irradiance/pi"`, what a white diffuse surface
+      leaves.
+    - `degree`: the largest that the package has, or None.
+    - `about`: what it is and where that stands, in words.
+
+    Raises `ValueError` for a fact that is none of these.
+
+    **Example**
+
+    >>> import dataclasses
+    >>> from jaxsh import harmonics
+    >>> splats = harmonics.conventions()["gaussian-splatting"]
+    >>> splats.phase, splats.layout
+    ('condon-shortley', 'channels-last')
+    >>> dataclasses.replace(splats, axes="y-up").axes
+    ('+x', '+z', '-y')
+    """
+
+    phase: Literal["none", "condon-shortley"] = "none"
+    order: str | tuple[tuple[int, int], ...] = "ascending"
+    normalization: str = "orthonormal"
+    basis_axes: str = "xyz"
+    axes: str | Axes = _OWN
+    layout: str = "coefficients-last"
+    quantity: str = "radiance"
+    degree: int | None = None
+    about: str = ""
+
+    def __post_init__(self):
+        check_choice("phase", self.phase, PHASES)
+        check_choice("normalization", self.normalization, NORMALIZATIONS)
+        check_choice("layout", self.layout, LAYOUTS)
+        check_choice("quantity", self.quantity, QUANTITIES)
+        check_type("about", self.about, str)
+        _set(self, "axes", _checked_axes(self.axes))
+        if not isinstance(self.basis_axes, str) or sorted(self.basis_axes) != ["x", "y", "z"]:
+            raise ValueError(
+                f"expected basis_axes as x, y and z in some order, got {described(self.basis_axes)}"
+            )
+        if self.degree is not None:
+            _set(self, "degree", check_degree(self.degree))
+        most = 2 if self.normalization == "polynomial" else None
+        if isinstance(self.order, str) or not isinstance(self.order, tuple | list):
+            check_choice("order", self.order, ORDERS)
+        else:
+            pairs = _checked_pairs(self.order)
+            _set(self, "order", pairs)
+            most = max(l for l, _ in pairs)
+        if most is not None and (self.degree is None or self.degree > most):
+            _set(self, "degree", most)
+
+
+def conventions() -> Mapping[str, Convention]:
+    """List the conventions that `convert` knows by name, with their facts.
+
+    **Returns** a mapping that cannot be changed, from name to `Convention`.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> harmonics.conventions()["three.js"].axes  # its y, up, is our z
+    ('+x', '+z', '-y')
+    """
+    return _CONVENTIONS
+
+
+def look_up(name: str, convention: str | Convention) -> Convention:
+    """Find a convention by its name; raises `ValueError` that says the nearest."""
+    if isinstance(convention, Convention):
+        return convention
+    if isinstance(convention, str) and convention in _CONVENTIONS:
+        return _CONVENTIONS[convention]
+    raise ValueError(
+        f"expected {name} as a Convention or a name of harmonics.conventions(), got "
+        f"{described(convention)}{nearest(convention, _CONVENTIONS)}"
+    )
+
+
+def places(convention: Convention, degree: int) -> Int[np.ndarray, " k"]:
+    """Locate each of our coefficients among the package's K, before its layout."""
+    l, m = degrees(degree), orders(degree)
+    if convention.order == "ascending":
+        return l * (l + 1) + m
+    if convention.order == "descending":
+        return l * (l + 1) - m
+    order = list(convention.order)
+    pairs = zip(l.tolist(), m.tolist(), strict=True)
+    return np.array([order.index(pair) for pair in pairs], np.int32)
+
+
+def scales(convention: Convention, degree: int) -> Float[np.ndarray, " k"]:
+    """Tabulate the package's basis functions over ours, for each (l, m), in float64."""
+    l, m = degrees(degree).astype(float), np.abs(orders(degree))
+    full = np.full(len(l), math.sqrt(4 * math.pi))
+    scale = {
+        "orthonormal": lambda: np.ones(len(l)),
+        "4pi": lambda: full,
+        "schmidt": lambda: full / np.sqrt(2 * l + 1),
+        "unnormalized": lambda: full * _unnormalized(degree),
+        "polynomial": lambda: 1 / _POLYNOMIAL[: num_coefficients(degree)],
+    }[convention.normalization]()
+    return np.where((m % 2 == 1) & (convention.phase != "none"), -scale, scale)
+
+
+def _unnormalized(degree: int) -> Float[np.ndarray, " k"]:
+    """√((l+m)! / (l-m)!) / √((2-δ)(2l+1)), by products of factors near each other."""
+    l, m = degrees(degree), np.abs(orders(degree))
+    pairs = zip(l.tolist(), m.tolist(), strict=True)
+    ratio = np.array([math.sqrt(math.prod(range(a - b + 1, a + b + 1))) for a, b in pairs])
+    return ratio / np.sqrt(np.where(m == 0, 1, 2) * (2 * l + 1))
+
+
+def _polynomial_constants() -> Float[np.ndarray, " 9"]:
+    pi = math.pi
+    y1, y2 = math.sqrt(3 / (4 * pi)), math.sqrt(15 / (4 * pi))
+    y20 = math.sqrt(5 / (16 * pi))
+    return np.array([math.sqrt(1 / (4 * pi)), y1, y1, y1, y2, y2, y20, y2, y2 / 2])
+
+
+_POLYNOMIAL = _polynomial_constants()
+
+
+def axes_matrix(convention: Convention) -> Int[np.ndarray, "3 3"]:
+    """The signed permutation from our directions to the arguments x, y, z of the package's basis.
+
+    Rows of `axes` say where the package's axes lie in ours, so that its coordinates are their
+    products with our direction.
+    """
+    rows = np.zeros((3, 3), np.int64)
+    for row, axis in enumerate(convention.axes):
+        rows[row, "xyz".index(axis[1])] = int(axis[0] + "1")
+    return rows[["xyz".index(axis) for axis in convention.basis_axes]]
+
+
+def _set(convention: Convention, field: str, value) -> None:
+    object.__setattr__(convention, field, value)
+
+
+def _checked_axes(axes) -> Axes:
+    if isinstance(axes, str):
+        check_choice("axes", axes, _UP)
+        return _UP[axes]
+    good = {sign + name for sign in "+-" for name in "xyz"}
+    fits = isinstance(axes, tuple | list) and all(isinstance(a, str) and a in good for a in axes)
+    if not fits or sorted(a[1] for a in axes) != ["x", "y", "z"]:
+        raise ValueError(
+            "expected axes as 'y-up', 'z-up' or three like ('+x', '+z', '-y'), where the package's "
+            f"x, y and z lie in ours, got {axes if fits else described(axes)}"
+        )
+    return tuple(axes)
+
+
+def _checked_pairs(order) -> tuple[tuple[int, int], ...]:
+    pairs = tuple(tuple(pair) if isinstance(pair, tuple | list) else pair for pair in order)
+    bands = math.isqrt(len(pairs))
+    full = {(l, m) for l in range(bands) for m in range(-l, l + 1)}
+    if len(pairs) != len(full) or not pairs or set(pairs) != full:
+        raise ValueError(
+            "expected order as 'ascending', 'descending' or each (l, m) up to a degree once, got "
+            f"{described(order)}"
+        )
+    return pairs
+
+
+def _named() -> dict[str, Convention]:
+    polynomial = {"normalization": "polynomial", "quantity": "irradiance/pi"}
+    return {
+        "jaxsh": Convention(about="this package"),
+        "irradiance": Convention(
+            quantity="irradiance", about="this package, after the clamped cosine"
+        ),
+        "condon-shortley": Convention(
+            phase="condon-shortley", about="real harmonics with the sign (-1)^m, in any axes"
+        ),
+        "directxmath": Convention(
+            phase="condon-shortley", degree=5, about="DirectXMath XMSHEvalDirection"
+        ),
+        "kaolin": Convention(phase="condon-shortley", degree=2, about="Kaolin render.lighting.sh"),
+        "gaussian-splatting": Convention(
+            phase="condon-shortley",
+            layout="channels-last",
+            degree=4,
+            about="3D Gaussian splatting, features (N, K, 3); color = ½ + the function of the "
+            "direction from the eye to the splat",
+        ),
+        "three.js": Convention(
+            axes="y-up", layout="channels-last", degree=2, about="SphericalHarmonics3, LightProbe"
+        ),
+        "unity": Convention(
+            **polynomial,
+            axes=("-x", "+z", "-y"),
+            layout="by-channel",
+            degree=2,
+            about="SphericalHarmonicsL2, 27 floats [channel, coefficient]; left-handed, y up",
+        ),
+        "unreal": Convention(
+            phase="condon-shortley",
+            axes=("+x", "-y", "+z"),
+            about="FSHVector; left-handed, z up",
+        ),
+        "filament": Convention(
+            **polynomial,
+            axes="y-up",
+            layout="channels-last",
+            degree=2,
+            about="what IndirectLight::Builder::irradiance takes: cmgen --sh-shader and sh.txt",
+        ),
+        "filament-sh": Convention(
+            phase="condon-shortley",
+            axes="y-up",
+            layout="channels-last",
+            about="cmgen --sh",
+        ),
+        "filament-sh-irradiance": Convention(
+            phase="condon-shortley",
+            axes="y-up",
+            layout="channels-last",
+            quantity="irradiance",
+            about="cmgen --sh --sh-irradiance",
+        ),
+        "gltf": Convention(
+            axes="y-up",
+            layout="channels-last",
+            quantity="irradiance",
+            degree=2,
+            about="irradianceCoefficients of EXT_lights_image_based",
+        ),
+        **{
+            f"pyshtools-{name}": Convention(
+                normalization=normalization,
+                layout="cosine-sine",
+                about=f"SHCoeffs, normalization='{name}', csphase=1",
+            )
+            for name, normalization in (
+                ("4pi", "4pi"),
+                ("ortho", "orthonormal"),
+                ("schmidt", "schmidt"),
+                ("unnorm", "unnormalized"),
+            )
+        },
+        **{
+            f"e3nn-{name}": Convention(
+                normalization=normalization,
+                basis_axes="zxy",
+                about=f"spherical_harmonics, normalization='{name}'",
+            )
+            for name, normalization in (
+                ("component", "4pi"),
+                ("integral", "orthonormal"),
+                ("norm", "schmidt"),
+            )
+        },
+        "sphericart": Convention(about="sphericart.SphericalHarmonics"),
+        "habel": Convention(about="tables of Habel et al. 2008"),
+    }
+
+
+_CONVENTIONS: Mapping[str, Convention] = MappingProxyType(_named())
