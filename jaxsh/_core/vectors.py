@@ -1,8 +1,13 @@
-"""Unit vectors from vectors of any length."""
+"""Unit vectors from vectors of any length, and matrices that turn them."""
+
+import math
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from .checks import as_float, is_concrete
 
 
 def components_first(vectors: Float[Array, "*batch 3"]) -> Float[Array, "3 1 n"]:
@@ -40,3 +45,21 @@ def _normalize_jvp(primals, tangents):
 
 def _dot(a: Float[Array, "3 1 n"], b: Float[Array, "3 1 n"]) -> Float[Array, "1 n"]:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def checked_rotation(rotation: ArrayLike) -> Float[Array, "*batch 3 3"]:
+    """Convert to orthogonal matrices; raises `ValueError` for what is known to be none."""
+    rotation = as_float(rotation, "rotation")
+    if rotation.shape[-2:] != (3, 3):
+        raise ValueError(f"expected rotation (..., 3, 3), matrices, got shape {rotation.shape}")
+    if is_concrete(rotation):
+        matrix = np.asarray(rotation, np.float64)
+        error = math.nan
+        if np.isfinite(matrix).all():
+            error = np.max(np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)), initial=0.0)
+        if not error <= 1e-3:
+            raise ValueError(
+                f"expected rotation as orthogonal matrices, but R Rᵀ is off the identity by "
+                f"{error:.1e}"
+            )
+    return rotation

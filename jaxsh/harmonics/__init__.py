@@ -13,7 +13,7 @@ from ._products import gaunt, product, product_matrix, triple_integral
 from ._rotation import rotate, rotate_z, rotation_matrix
 from ._tables import legendre
 from ._windows import damping, window
-from ._zonal import clamped_cosine, convolve, phong
+from ._zonal import clamped_cosine, convolve, disc, phong
 
 __all__ = [
     "Convention",
@@ -25,6 +25,7 @@ __all__ = [
     "degree_of",
     "degrees",
     "dering",
+    "disc",
     "evaluate",
     "evaluate_with_gradient",
     "gaunt",

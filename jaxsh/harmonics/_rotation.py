@@ -1,7 +1,6 @@
 """Rotation of functions on the sphere."""
 
 import functools
-import math
 
 import jax
 import jax.numpy as jnp
@@ -14,9 +13,9 @@ from .._core.checks import (
     check_batches,
     check_coefficients,
     check_degree,
-    is_concrete,
 )
 from .._core.linalg import einsum, matmul
+from .._core.vectors import checked_rotation
 from ._basis import evaluate
 from ._indexing import degrees, orders
 from ._tables import even_grid
@@ -48,7 +47,7 @@ def rotation_matrix(
     >>> harmonics.rotation_matrix(jnp.eye(3), degree=2).shape
     (9, 9)
     """
-    rotation = _checked_rotation(rotation)
+    rotation = checked_rotation(rotation)
     return _rotation_matrix(rotation, check_degree(degree))
 
 
@@ -77,7 +76,7 @@ def rotate(
     """
     coefficients = as_float(coefficients, "coefficients")
     degree = check_coefficients("coefficients", coefficients)
-    rotation = _checked_rotation(rotation).astype(coefficients.dtype)
+    rotation = checked_rotation(rotation).astype(coefficients.dtype)
     check_batches(coefficients=coefficients.shape, rotation=rotation.shape[:-1])
     matrix = _rotation_matrix(rotation, degree)
     if matrix.ndim == 2:
@@ -128,20 +127,3 @@ def _rotation_matrix(rotation: Float[Array, "*batch 3 3"], degree: int) -> Float
     matrix = einsum("in,j...n->...ij", weighted, evaluate(turned, degree, axis=0))
     same_degree = np.equal.outer(degrees(degree), degrees(degree))
     return jnp.where(same_degree, matrix, jnp.zeros_like(matrix))
-
-
-def _checked_rotation(rotation: ArrayLike) -> Float[Array, "*batch 3 3"]:
-    rotation = as_float(rotation, "rotation")
-    if rotation.shape[-2:] != (3, 3):
-        raise ValueError(f"expected rotation (..., 3, 3), matrices, got shape {rotation.shape}")
-    if is_concrete(rotation):
-        matrix = np.asarray(rotation, np.float64)
-        error = math.nan
-        if np.isfinite(matrix).all():
-            error = np.max(np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)), initial=0.0)
-        if not error <= 1e-3:
-            raise ValueError(
-                f"expected rotation as orthogonal matrices, but R Rᵀ is off the identity by "
-                f"{error:.1e}"
-            )
-    return rotation

@@ -73,6 +73,50 @@ def phong(
     return jnp.divide(*align(lambdas, _unit_lambdas(degree, lambdas.dtype)))
 
 
+def disc(solid_angle: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "*batch bands"]:
+    """Make the zonal coefficients g_l of a disc of radiance 1, dark outside of it.
+
+    λ_l = 2π ∫_c^1 P_l(x) dx = 2π (1 - c²) P_l'(c) / (l(l+1)), c the cosine of the disc's radius:
+    the usual difference of two Legendre polynomials would lose as many digits as the disc is small.
+
+    **Arguments**
+
+    - `solid_angle`: (...), 2π (1 - c), in steradians, from 0 to 4π. Differentiable.
+    - `degree`: the largest l, known at trace time.
+
+    **Returns** (..., degree+1) in the dtype of the solid angle, for `convolve`. Raises `ValueError`
+    where the solid angle's value is known before tracing and not from 0 to 4π.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import harmonics
+    >>> y = harmonics.evaluate(jnp.array([0.6, 0.0, 0.8]), degree=2)
+    >>> sun = harmonics.convolve(y, harmonics.disc(6.8e-5, degree=2))
+    >>> round(float(sun[0] / y[0]) * 1e5, 3)
+    6.8
+    """
+    degree = check_degree(degree)
+    omega = as_float(solid_angle, "solid_angle")
+    if is_concrete(omega):
+        known = np.asarray(omega)
+        # A little above 4π, for its rounding in float32.
+        if (wrong := ~((known >= 0) & (known <= 12.56638))).any():
+            found = known[wrong].flat[0]
+            raise ValueError(f"expected solid_angle from 0 to 4π, got {found:g}")
+    height = omega / (2 * np.pi)  # 1 - c
+    c = 1 - height
+    lambdas = [omega]
+    # P_{l+1}' = P_{l-1}' + (2l+1) P_l, and P_l by its own recurrence.
+    before, value, slope_before, slope = jnp.ones_like(c), c, jnp.zeros_like(c), jnp.ones_like(c)
+    for l in range(1, degree + 1):
+        lambdas.append(omega * (2 - height) * slope / (l * (l + 1)))
+        slope_before, slope = slope, slope_before + (2 * l + 1) * value
+        before, value = value, ((2 * l + 1) * c * value - l * before) / (l + 1)
+    stacked = jnp.stack(lambdas, axis=-1)
+    return jnp.divide(*align(stacked, _unit_lambdas(degree, stacked.dtype)))
+
+
 def convolve(
     coefficients: Float[ArrayLike, "*batch k"], zonal: Float[ArrayLike, "*kernels bands"]
 ) -> Float[Array, "*out k"]:

@@ -11,7 +11,7 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import align, check_batches, check_degree, check_number
 from .._core.host import read_only_cache
 from .._core.linalg import matmul
-from ..harmonics import degrees, evaluate
+from ..harmonics import convolve, disc, evaluate
 from ._angles import angles, directions, parameter
 from ._color import Space, check_space, from_xyz
 from ._validity import Check, check_option, check_sun, check_turbidity
@@ -93,22 +93,9 @@ def sun_harmonics(
     radius = check_number("radius", radius, above=0.0, most=math.pi)
     radiance = sun_radiance(sun, turbidity, space=space, check=check)
     basis = evaluate(directions(sun, "sun"), degree)
-    basis, lambdas = align(basis, jnp.asarray(disc_lambdas(radius, degree), basis.dtype))
-    return jnp.multiply(*align(radiance[..., None], (basis * lambdas)[..., None, :]))
-
-
-def disc_lambdas(radius: float, degree: int) -> Float[np.ndarray, " k"]:
-    """Factors λ_l of a disc, one for each coefficient, on the host.
-
-    ∫_c^1 P_l = (1 - c²) P_l'(c) / (l(l+1)): the usual difference of two Legendre polynomials
-    would lose as many digits as the disc is small.
-    """
-    cosine, sine = math.cos(radius), math.sin(radius)
-    lambdas = [4 * math.pi * math.sin(radius / 2) ** 2]
-    for l in range(1, degree + 1):
-        slope = np.polynomial.Legendre.basis(l).deriv()(cosine)
-        lambdas.append(2 * math.pi * sine**2 * slope / (l * (l + 1)))
-    return np.array(lambdas)[degrees(degree)]
+    solid_angle = 4 * math.pi * math.sin(radius / 2) ** 2
+    spread = convolve(basis, disc(jnp.asarray(solid_angle, basis.dtype), degree))
+    return jnp.multiply(*align(radiance[..., None], spread[..., None, :]))
 
 
 @functools.partial(jax.jit, static_argnames=("space",))

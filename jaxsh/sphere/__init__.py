@@ -3,9 +3,11 @@
 from ._lat_long import project_lat_long, reconstruct_lat_long
 from ._project import irradiance, project, reconstruct
 from ._quadrature import Quadrature, cube_map, fibonacci, gauss_legendre, lat_long
+from ._suns import Suns
 
 __all__ = [
     "Quadrature",
+    "Suns",
     "cube_map",
     "fibonacci",
     "gauss_legendre",

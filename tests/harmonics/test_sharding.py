@@ -66,6 +66,7 @@ def test_products_and_kernels(rng):
             harmonics.convolve(f, kernels),
             harmonics.convolve(f, harmonics.clamped_cosine(2)),
             harmonics.damping(exponents, 2),
+            harmonics.disc(exponents, 2),
         )
 
     f, g, exponents = (

@@ -184,3 +184,27 @@ def test_bad_kernels_are_refused(unchecked):
         harmonics.convolve(np.ones(9), 1.0)
     with pytest.raises(ValueError, match=r"1, 4, 9, 16.*got shape .*8,?\)"):
         harmonics.convolve(np.ones(8), np.ones(3))
+
+
+@pytest.mark.parametrize("radius", [0.2666 * np.pi / 180, 0.1, 1.2, np.pi])
+def test_disc_by_quadrature(radius):
+    """Gauss–Legendre in the depth 1 - cos θ, which keeps the digits of a small disc."""
+    depth = 2 * np.sin(radius / 2) ** 2
+    node, weight = np.polynomial.legendre.leggauss(12)
+    fall = depth * (1 - node) / 2
+    expected = [np.pi * depth * weight @ eval_legendre(l, 1 - fall) for l in range(13)]
+    found = lambdas(harmonics.disc(2 * np.pi * depth, 12))
+    np.testing.assert_allclose(found, expected, 0, 2e-14 * expected[0])
+    single = harmonics.disc(np.float32(2 * np.pi * depth), 12)
+    assert single.dtype == np.float32
+    np.testing.assert_allclose(lambdas(single), expected, 0, 2e-6 * expected[0])
+
+
+def test_disc_derivative_and_refusal():
+    """The derivative of ∫ P_l over the disc is P_l at its rim."""
+    areas = np.array([0.01, 2.0])
+    _, slope = jax.jvp(lambda a: harmonics.disc(a, 6), (areas,), (np.ones(2),))
+    rim = eval_legendre(np.arange(7), 1 - areas[:, None] / (2 * np.pi))
+    np.testing.assert_allclose(lambdas(slope), rim, 0, 1e-14)
+    with pytest.raises(ValueError, match="expected solid_angle from 0 to 4π, got 13"):
+        harmonics.disc(13.0, 2)

@@ -16,46 +16,18 @@ from jaxsh.sky._sun import (
     WATER,
     WAVELENGTHS,
     color_matching,
-    disc_lambdas,
     optical_mass,
 )
 
 SOLID_ANGLE = 4 * math.pi * math.sin(sky.SUN_RADIUS / 2) ** 2
 
 
-def disc_nodes(radius, direction, degree):
-    """Gauss–Legendre in the disc's cosine, even steps around it."""
-    node, weight = np.polynomial.legendre.leggauss(degree + 1)
-    depth = 2 * math.sin(radius / 2) ** 2  # 1 - cos, without cancellation
-    fall = depth * (1 - node) / 2
-    cosine, sine = 1 - fall, np.sqrt(fall * (2 - fall))[:, None]
-    around = np.arange(degree + 1) * 2 * np.pi / (degree + 1)
-    weight = np.repeat(weight * depth / 2, degree + 1) * around[1]
-    frame = np.linalg.svd(direction[None])[2]
-    points = (
-        cosine[:, None, None] * frame[0] * np.sign(frame[0] @ direction)
-        + (sine * np.cos(around))[..., None] * frame[1]
-        + (sine * np.sin(around))[..., None] * frame[2]
-    )
-    return points.reshape(-1, 3), weight
-
-
-@pytest.mark.parametrize("radius", [sky.SUN_RADIUS, 0.1, 1.2, math.pi])
-def test_the_disc_against_quadrature(radius):
-    sun = sun_at(35.0, 20.0)
-    points, weights = disc_nodes(radius, sun, 12)
-    expected = weights @ np.asarray(harmonics.evaluate(points, 8))
-    found = disc_lambdas(radius, 8) * np.asarray(harmonics.evaluate(sun, 8))
-    np.testing.assert_allclose(found, expected, 0, 2e-14 * weights.sum())
-
-
 def test_harmonics_are_radiance_times_the_disc():
     sun, turbidity = sun_at(np.array([80.0, 20.0]), 20.0), np.array([2.0, 4.0])
     found = np.asarray(sky.sun_harmonics(sun, turbidity, 4))
     radiance = np.asarray(sky.sun_radiance(sun, turbidity))
-    expected = np.einsum(
-        "nc,k,nk->nck", radiance, disc_lambdas(sky.SUN_RADIUS, 4), harmonics.evaluate(sun, 4)
-    )
+    disc = harmonics.convolve(harmonics.evaluate(sun, 4), harmonics.disc(SOLID_ANGLE, 4))
+    expected = np.einsum("nc,nk->nck", radiance, disc)
     np.testing.assert_allclose(found, expected, 1e-13)
     irradiance = np.asarray(sky.horizontal_irradiance(found))
     # The mean cosine over a small disc: cos θ · cos²(ρ/2).

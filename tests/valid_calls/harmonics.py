@@ -33,6 +33,7 @@ def calls():
         "degree_of": of(h.degree_of, count=9),
         "degrees": of(h.degrees, degree=2),
         "dering": of(h.dering, coefficients=f, of="irradiance"),
+        "disc": of(h.disc, solid_angle=floats(), degree=2, finite="solid_angle"),
         "evaluate": of(h.evaluate, vectors=vectors, degree=2, axis=-1),
         "evaluate_with_gradient": of(h.evaluate_with_gradient, vectors=vectors, degree=2, axis=-1),
         "gaunt": of(h.gaunt, degree=1),

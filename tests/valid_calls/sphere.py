@@ -10,10 +10,21 @@ from .shared import K, V, floats, of
 def calls():
     s = sphere
     quadrature = s.fibonacci(7)
+    suns = s.Suns(floats(2, 3), floats(2), floats(2, 3), floats(2, 8, 3))
     return {
         "Quadrature": of(
             s.Quadrature, directions=np.asarray(quadrature.directions), weights=floats(7)
         ),
+        "Suns": of(
+            s.Suns,
+            direction=floats(2, 3),
+            solid_angle=floats(2),
+            radiance=floats(2, 3),
+            shape=floats(2, 8, 3),
+        ),
+        "Suns.harmonics": of(suns.harmonics, degree=2),
+        "Suns.rays": of(suns.rays, count=4),
+        "Suns.rotate": of(suns.rotate, rotation=np.eye(3), finite="rotation"),
         "cube_map": of(s.cube_map, resolution=2),
         "fibonacci": of(s.fibonacci, count=7),
         "gauss_legendre": of(s.gauss_legendre, degree=2),
