@@ -1,7 +1,6 @@
-"""Indices of rows: equal ones, stretches of them, and groups of what is linked."""
+"""Indices of rows: equal ones, and groups of what is linked."""
 
 import numpy as np
-from jaxtyping import Int
 
 
 def first_of_equals(rows: np.ndarray) -> np.ndarray:
@@ -29,12 +28,6 @@ def first_of_keys(keys: np.ndarray) -> np.ndarray:
     first = np.empty(len(keys), np.int64)
     first[order] = np.repeat(order[begins], np.diff(begins, append=len(keys)))
     return first
-
-
-def ranges(first: Int[np.ndarray, " n"], counts: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
-    """Put `first`, `first + 1`, …, so many as `counts` says, in a row for all."""
-    begin = np.cumsum(counts) - counts
-    return np.arange(int(counts.sum())) + np.repeat(first - begin, counts)
 
 
 def groups(one: np.ndarray, two: np.ndarray, *, number: int) -> tuple[int, np.ndarray]:

@@ -7,7 +7,8 @@ import numpy as np
 from jaxtyping import Array, Int
 
 from .._core.checks import check_faces, check_type
-from ._indices import first_of_equals, groups, ranges
+from .._core.ranges import ranges
+from ._indices import first_of_equals, groups
 from ._mesh import Mesh
 
 

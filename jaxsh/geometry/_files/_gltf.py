@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from ._gltf_container import Document, open_document
-from ._gltf_json import extension, listed
+from ..._core.gltf import Document, open_document
+from ..._core.json_fields import extension, listed
 from ._gltf_materials import Materials
 from ._gltf_primitives import Part, read_parts
 from ._gltf_scene import Placement, placements

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Integer, Shaped
 
-from ._gltf_container import Document
-from ._gltf_json import Fields, extension, flag, inner, shown, text, whole
+from ..._core.gltf import Document
+from ..._core.json_fields import Fields, extension, flag, inner, shown, text, whole
 from ._gltf_meshopt import unpack
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Integer
 
+from ..._core.gltf import Document
+from ..._core.json_fields import Fields, extension, flag, inner, shown, text, whole
 from ._gltf_accessors import WIDTHS, Accessor, view_bytes
-from ._gltf_container import Document
-from ._gltf_json import Fields, extension, flag, inner, shown, text, whole
 
 _NAME = "KHR_draco_mesh_compression"
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from ..._core.gltf import Document
+from ..._core.json_fields import Fields, extension, flag, inner, numbers, text, whole
 from .._base_color import BaseColor
-from ._gltf_container import Document
-from ._gltf_json import Fields, extension, flag, inner, numbers, text, whole
 from ._gltf_pictures import Pictures
 
 _REPEAT = 10497

@@ -6,8 +6,8 @@ Source: the bitstreams and filters in the text of both extensions (Khronos).
 import numpy as np
 from jaxtyping import UInt8
 
-from ._gltf_container import Document
-from ._gltf_json import Fields, shown, text, whole
+from ..._core.gltf import Document
+from ..._core.json_fields import Fields, shown, text, whole
 from ._gltf_meshopt_filters import FILTERS
 from ._gltf_meshopt_indices import unpack_sequence, unpack_triangles
 

@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import UInt8
 
+from ..._core.gltf import Document
+from ..._core.json_fields import Fields, extension, text, whole
 from ..._core.words import reason
 from ._gltf_accessors import view_bytes
-from ._gltf_container import Document
-from ._gltf_json import Fields, extension, text, whole
 from ._pictures import Decoder
 
 _FORMATS = ("PNG", "JPEG", "WEBP")

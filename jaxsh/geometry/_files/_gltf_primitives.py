@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Integer
 
+from ..._core.gltf import Document
+from ..._core.json_fields import Fields, inner, listed, numbers, shown, whole
 from ._gltf_accessors import WIDTHS, Accessor, read_accessor, read_indices
-from ._gltf_container import Document
 from ._gltf_draco import decode_draco
-from ._gltf_json import Fields, inner, listed, numbers, shown, whole
 from ._gltf_materials import Materials
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes; below them are points and lines

@@ -6,9 +6,19 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from ..._core.gltf import Document
+from ..._core.json_fields import (
+    Fields,
+    extension,
+    flag,
+    indices,
+    inner,
+    listed,
+    numbers,
+    shown,
+    whole,
+)
 from ._gltf_accessors import read_accessor
-from ._gltf_container import Document
-from ._gltf_json import Fields, extension, flag, indices, inner, listed, numbers, shown, whole
 
 # The pose of a node, by default none.
 _REST = {

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
+from ..._core.text import decode, plain_text, without_comment
 from .._base_color import BaseColor
 from ._pictures import beside, read_picture
-from ._text import decode, plain_text, without_comment
 
 # How many words follow each option of a map at least, and at most where they are numbers.
 _OPTIONS = {

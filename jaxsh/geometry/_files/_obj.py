@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._indices import ranges
+from ..._core.ranges import ranges
+from ..._core.text import JOINT, Words, decode, parse, plain_text, without_comment
 from ._mtl import Materials
-from ._polygons import Polygons
-from ._text import JOINT, Words, decode, parse, plain_text, unit_colors, without_comment
+from ._polygons import Polygons, unit_colors
 
 # Every statement of the format (Wavefront's appendix B1): a damaged "f" must not pass for another.
 _STATEMENTS = re.compile(

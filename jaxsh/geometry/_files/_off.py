@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .._indices import ranges
-from ._polygons import Polygons, at_corners, without_points_and_lines
-from ._text import Words, plain_text, unit_colors
+from ..._core.ranges import ranges
+from ..._core.text import Words, plain_text
+from ._polygons import Polygons, at_corners, unit_colors, without_points_and_lines
 
 _HEADER = re.compile(
     rb"\s*(?:#[^\n]*\n\s*)*(?P<uv>ST)?(?P<color>C)?(?P<normal>N)?(?P<four>4)?(?P<n>n)?OFF"

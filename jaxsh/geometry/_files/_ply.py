@@ -4,12 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..._core.ply import Columns, Lists, read_elements, read_header
+from ..._core.ranges import ranges
 from .._base_color import BaseColor
-from .._indices import ranges
 from ._pictures import read_picture
-from ._ply_data import Columns, Lists, read_elements, read_header
-from ._polygons import Polygons, at_corners, without_points_and_lines
-from ._text import unit_colors
+from ._polygons import Polygons, at_corners, unit_colors, without_points_and_lines
 
 _NORMALS = [("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z")]
 _UV = [("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t")]

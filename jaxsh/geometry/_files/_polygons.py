@@ -67,3 +67,22 @@ def unit(vectors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
         # Of length 1 to float32's rounding: kept to the bit.
         near = np.abs(scaled - vectors).max(axis=-1, keepdims=True) < 1e-6
         return np.where(near, vectors, scaled)
+
+
+def unit_colors(colors: Float[np.ndarray, "n k"]) -> tuple[Float[np.ndarray, "n 4"], str | None]:
+    """Give RGBA from three or four values each, and a phrase where they had to be guessed at.
+
+    Whole numbers up to 255 that pass 1 are taken for bytes, others outside of 0 to 1 as they are.
+    """
+    finite = colors[np.isfinite(colors)]
+    least, most = finite.min(initial=0), finite.max(initial=0)
+    phrase = None
+    if least >= 0 and 1 < most <= 255 and (finite == np.rint(finite)).all():
+        colors = colors / 255
+        phrase = "colors up to 255 taken for bytes"
+    elif least < -1e-6 or most > 1 + 1e-6:
+        below = " but for negative ones, which become 0" if least < 0 else ""
+        phrase = f"colors from {least:.3g} to {most:.3g} taken as they are{below}"
+    if colors.shape[1] == 3:
+        colors = np.concatenate([colors, np.ones((len(colors), 1))], axis=1)
+    return colors, phrase

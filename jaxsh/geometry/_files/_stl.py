@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..._core.text import Words, plain_text
 from ._polygons import Polygons
-from ._text import Words, plain_text
 
 _FACET = "facet normal ? ? ? outer loop vertex ? ? ? vertex ? ? ? vertex ? ? ? endloop endfacet"
 _TEXT = re.compile(rb"\bfacet\b|^[ \t]*end[ \t]*solid", re.I | re.M)

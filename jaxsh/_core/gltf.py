@@ -12,7 +12,7 @@ from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 
-from ._gltf_json import Fields, inner, listed, shown, text, whole
+from .json_fields import Fields, inner, listed, shown, text, whole
 
 # What may be required: either handled here, or without a bearing on shape, UV and base color.
 _KNOWN = {

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._indices import ranges
-from ._text import Words, decode, plain_text
+from .ranges import ranges
+from .text import Words, decode, plain_text
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),

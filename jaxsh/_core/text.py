@@ -4,9 +4,9 @@ import re
 import warnings
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
-from .._indices import ranges
+from .ranges import ranges
 
 _BLANK = np.zeros(256, bool)
 _BLANK[list(b" \t\n\v\f\r")] = True
@@ -127,22 +127,3 @@ def _parse(text: bytes, kind: type) -> np.ndarray | None:
             return np.fromstring(text, kind, sep=" ")
         except (DeprecationWarning, ValueError):
             return None
-
-
-def unit_colors(colors: Float[np.ndarray, "n k"]) -> tuple[Float[np.ndarray, "n 4"], str | None]:
-    """Give RGBA from three or four values each, and a phrase where they had to be guessed at.
-
-    Whole numbers up to 255 that pass 1 are taken for bytes, others outside of 0 to 1 as they are.
-    """
-    finite = colors[np.isfinite(colors)]
-    least, most = finite.min(initial=0), finite.max(initial=0)
-    phrase = None
-    if least >= 0 and 1 < most <= 255 and (finite == np.rint(finite)).all():
-        colors = colors / 255
-        phrase = "colors up to 255 taken for bytes"
-    elif least < -1e-6 or most > 1 + 1e-6:
-        below = " but for negative ones, which become 0" if least < 0 else ""
-        phrase = f"colors from {least:.3g} to {most:.3g} taken as they are{below}"
-    if colors.shape[1] == 3:
-        colors = np.concatenate([colors, np.ones((len(colors), 1))], axis=1)
-    return colors, phrase
