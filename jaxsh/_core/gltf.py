@@ -2,17 +2,16 @@
 
 import base64
 import binascii
-import json
 import posixpath
 import struct
 from collections import Counter
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 
-from .json_fields import Fields, inner, listed, shown, text, whole
+from .json_fields import Fields, inner, listed, parse_object, shown, text, whole
 
 # What may be required: either handled here, or without a bearing on shape, UV and base color.
 _KNOWN = {
@@ -175,7 +174,7 @@ def open_document(path: Path, data: bytes) -> Document:
         source = memoryview(data)
         if not data.removeprefix(b"\xef\xbb\xbf").lstrip().startswith((b"{", b"[")):
             raise ValueError(f"it begins with {data[:4]!r}: neither the mark glTF nor JSON")
-    fields = _parse(source)
+    fields = parse_object(source)
     document = Document(path.parent, fields, chunk, len(data))
     document.note("bytes after its end ignored", trailing)
     _check_version(fields)
@@ -211,25 +210,6 @@ def _split(data: bytes) -> tuple[memoryview, memoryview | None, int]:
         raise ValueError("its first chunk is not JSON")
     binary = [chunk for kind, chunk in chunks[1:] if kind == _BIN]
     return chunks[0][1], binary[0] if binary else None, len(data) - length
-
-
-def _parse(source: memoryview) -> Fields:
-    def refuse(constant: str) -> NoReturn:
-        raise ValueError(f"{constant} is no number of JSON")
-
-    try:
-        # Some writers pad with zeros instead of spaces.
-        decoded = bytes(source).rstrip(b"\0").decode("utf-8-sig")
-        fields: Any = json.loads(decoded, parse_constant=refuse)
-    except RecursionError:
-        raise ValueError("its JSON is nested too deeply") from None
-    except UnicodeDecodeError as error:
-        raise ValueError(f"its JSON is not UTF-8 at byte {error.start}") from None
-    except ValueError as error:
-        raise ValueError(f"its JSON is damaged: {error}") from None
-    if not isinstance(fields, dict):
-        raise ValueError(f"its JSON should be an object, got {shown(fields)}")
-    return fields
 
 
 def _check_version(fields: Fields) -> None:

@@ -1,9 +1,36 @@
-"""Take fields from the JSON of a glTF file, each checked for its type and range."""
+"""Read JSON, and take fields from it, each checked for its type and range."""
 
+import json
 import math
-from typing import Any
+from typing import Any, NoReturn
 
 Fields = dict[str, Any]
+
+
+def parse(source: bytes | memoryview) -> Any:
+    """Read JSON in UTF-8; raises `ValueError` for what is none, and for NaN and Infinity."""
+
+    def refuse(constant: str) -> NoReturn:
+        raise ValueError(f"{constant} is no number of JSON")
+
+    try:
+        # Some writers pad with zeros instead of spaces.
+        decoded = bytes(source).rstrip(b"\0").decode("utf-8-sig")
+        return json.loads(decoded, parse_constant=refuse)
+    except RecursionError:
+        raise ValueError("its JSON is nested too deeply") from None
+    except UnicodeDecodeError as error:
+        raise ValueError(f"its JSON is not UTF-8 at byte {error.start}") from None
+    except ValueError as error:
+        raise ValueError(f"its JSON is damaged: {error}") from None
+
+
+def parse_object(source: bytes | memoryview) -> Fields:
+    """Read JSON that is an object, as `parse` does."""
+    fields = parse(source)
+    if not isinstance(fields, dict):
+        raise ValueError(f"its JSON should be an object, got {shown(fields)}")
+    return fields
 
 
 def whole(fields: Fields, key: str, owner: str, default: int | None = None) -> int:

@@ -1,13 +1,18 @@
-"""Read NumPy's file format from memory, at no more memory than the file has."""
+"""Read NumPy's file formats, at no more memory than a file can mean."""
 
 import io
 import math
 import warnings
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from .words import reason
+
+_ROOM = 1 << 26  # bytes that a small archive may unpack to
 
 
 class NpyHeader(NamedTuple):
@@ -56,3 +61,30 @@ def from_npy(data: bytes) -> np.ndarray:
         )
     numbers = np.frombuffer(body, header.dtype) if size else np.empty(count, header.dtype)
     return numbers.reshape(header.shape, order="F" if header.by_columns else "C")
+
+
+def npz_names(path: Path) -> list[str]:
+    """List the arrays of an .npz file; raises `ValueError` where it is no archive."""
+    if not zipfile.is_zipfile(path):
+        raise ValueError("not an archive, or a truncated one")
+    with zipfile.ZipFile(path) as archive:
+        return [name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")]
+
+
+def from_npz(path: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
+    """Give those arrays of an .npz file that are there.
+
+    A damaged archive may raise anything. Raises `ValueError` for one that announces more than its
+    bytes can mean.
+    """
+    with zipfile.ZipFile(path) as archive:
+        members = set(archive.namelist())
+        stored = {name: f"{name}.npy" for name in names if f"{name}.npy" in members}
+        entries = [archive.getinfo(file) for file in stored.values()]
+        size, held = sum(entry.file_size for entry in entries), path.stat().st_size
+        # What the directory says is asked for from the memory before anything is read.
+        if any(entry.compress_size > held for entry in entries):
+            raise ValueError(f"its directory announces more than the {held} bytes that are there")
+        if size > 10 * held + _ROOM:
+            raise ValueError(f"it unpacks to {size} bytes out of {held}, which is not plausible")
+        return {name: from_npy(archive.read(file)) for name, file in stored.items()}

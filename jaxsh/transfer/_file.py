@@ -9,13 +9,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._core.checks import as_path, check_type
-from .._core.npy import from_npy
+from .._core.files import check_place, put_in_place
+from .._core.npy import from_npz
 from .._core.words import reason
 from ..harmonics import degree_of
 from ._transfer import Transfer
 
 _FORMAT, _VERSION = "jaxsh transfer", 1
-_ROOM = 1 << 26  # bytes that a small file may unpack to
 _FIELDS = {"coefficients": "f", "positions": "f", "normals": "f", "neighbors": "i"}
 
 
@@ -42,17 +42,9 @@ def save(path: str | os.PathLike[str], transfer: Transfer) -> Path:
     arrays = {name: np.asarray(getattr(transfer, name)) for name in _FIELDS}
     if problem := _problem(arrays):
         raise ValueError(f"{path}: cannot be written: {problem}")
-    if path.is_dir():
-        raise IsADirectoryError(f"{path}: cannot be written: it is a folder")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    try:
-        with unfinished.open("wb") as file:
-            labels = {"format": np.array(_FORMAT), "version": np.array(_VERSION)}
-            np.savez(file, allow_pickle=False, **labels, **arrays)
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    check_place(path)
+    labels = {"format": np.array(_FORMAT), "version": np.array(_VERSION)}
+    put_in_place({path: lambda file: np.savez(file, allow_pickle=False, **labels, **arrays)})
     return path
 
 
@@ -79,7 +71,7 @@ def load(path: str | os.PathLike[str]) -> Transfer:
     if not zipfile.is_zipfile(path):
         raise ValueError(f"{path}: not a transfer file, or a truncated one")
     try:
-        arrays = _unpack(path)
+        arrays = from_npz(path, ["format", "version", *_FIELDS])
     except Exception as error:  # a damaged archive may raise anything
         raise ValueError(f"{path}: damaged: {reason(error)}") from error
     if str(arrays.pop("format", None)) != _FORMAT:
@@ -99,22 +91,6 @@ def load(path: str | os.PathLike[str]) -> Transfer:
 def _in_jax_types(array: np.ndarray) -> np.ndarray:
     with np.errstate(over="ignore"):
         return array.astype(jax.dtypes.canonicalize_dtype(array.dtype.newbyteorder("=")))
-
-
-def _unpack(path: Path) -> dict[str, np.ndarray]:
-    """Take the arrays that make a transfer out of an archive."""
-    names = ["format", "version", *_FIELDS]
-    with zipfile.ZipFile(path) as archive:
-        members = set(archive.namelist())
-        stored = {name: f"{name}.npy" for name in names if f"{name}.npy" in members}
-        entries = [archive.getinfo(file) for file in stored.values()]
-        size, held = sum(entry.file_size for entry in entries), path.stat().st_size
-        # What the directory says is asked for from the memory before anything is read.
-        if any(entry.compress_size > held for entry in entries):
-            raise ValueError(f"its directory announces more than the {held} bytes that are there")
-        if size > 10 * held + _ROOM:
-            raise ValueError(f"it unpacks to {size} bytes out of {held}, which is not plausible")
-        return {name: from_npy(archive.read(file)) for name, file in stored.items()}
 
 
 def _problem(arrays: dict[str, np.ndarray]) -> str | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from ..._core.checks import as_path, check_choice, check_type
+from ..._core.files import check_place, put_in_place
 from .._mesh import Mesh
 from ._write_arrays import Arrays, has, on_host, problem, turned_to_y
 from ._write_glb import glb_files
@@ -75,30 +76,14 @@ def write_mesh(
     arrays, form = on_host(mesh), _FORMATS[suffix]
     if reason := problem(arrays):
         raise ValueError(f"{path}: cannot be written: {reason}")
-    if path.is_dir():
-        raise IsADirectoryError(f"{path}: cannot be written: it is a folder")
+    check_place(path)
     if suffix == ".stl" and any(arrays.origin):
         raise ValueError(
             f"{path}: .stl has float32 positions, which cannot hold the origin {arrays.origin}: "
             "write .ply, or a mesh without origin"
         )
     files = form.files(turned_to_y(arrays) if (up or form.up) == "y" else arrays, path.stem)
-    _write(path, files)
+    put_in_place({path.with_name(name) if name else path: data for name, data in files.items()})
     if lost := [what for what in form.leaves_out if has(arrays, what)]:
         warnings.warn(f"{path}: left out, as {suffix} has none: {', '.join(lost)}", stacklevel=2)
     return path
-
-
-def _write(path: Path, files: dict[str, bytes]) -> None:
-    """Write files into the folder of `path`, the one named "" as `path` itself: all, or none."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    finals = [path.with_name(name) if name else path for name in files]
-    unfinished = [final.with_name(f"{final.name}.{os.getpid()}.tmp") for final in finals]
-    try:
-        for temporary, data in zip(unfinished, files.values(), strict=True):
-            temporary.write_bytes(data)
-        for temporary, final in zip(unfinished, finals, strict=True):
-            temporary.replace(final)
-    finally:
-        for temporary in unfinished:
-            temporary.unlink(missing_ok=True)
