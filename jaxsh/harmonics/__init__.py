@@ -5,7 +5,8 @@ function of degree L has K = (L+1)² coefficients. Directions are x, y, z.
 """
 
 from ._basis import evaluate, evaluate_with_gradient
-from ._convention import Convention, conventions
+from ._convention import Convention
+from ._conventions import conventions
 from ._convert import convert
 from ._dering import dering
 from ._indexing import degree_of, degrees, index, num_coefficients, orders

@@ -1,15 +1,12 @@
-"""Conventions of spherical-harmonic coefficients: a few facts each, and the table of names."""
+"""What coefficients of another package mean: a convention as a few facts, and what follows."""
 
 import dataclasses
 import math
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from .._core.checks import check_choice, check_degree, check_type, described, nearest
+from .._core.checks import check_choice, check_degree, check_type, described
 from ._indexing import degrees, num_coefficients, orders
 
 PHASES = "none", "condon-shortley"
@@ -65,7 +62,7 @@ class Convention:
     ('+x', '+z', '-y')
     """
 
-    phase: Literal["none", "condon-shortley"] = "none"
+    phase: str = "none"
     order: str | tuple[tuple[int, int], ...] = "ascending"
     normalization: str = "orthonormal"
     basis_axes: str = "xyz"
@@ -87,42 +84,17 @@ class Convention:
                 f"expected basis_axes as x, y and z in some order, got {described(self.basis_axes)}"
             )
         if self.degree is not None:
-            _set(self, "degree", check_degree(self.degree))
-        most = 2 if self.normalization == "polynomial" else None
-        if isinstance(self.order, str) or not isinstance(self.order, tuple | list):
-            check_choice("order", self.order, ORDERS)
-        else:
+            check_degree(self.degree)
+        limits = [self.degree] if self.degree is not None else []
+        if self.normalization == "polynomial":
+            limits.append(2)
+        if isinstance(self.order, tuple | list):
             pairs = _checked_pairs(self.order)
             _set(self, "order", pairs)
-            most = max(l for l, _ in pairs)
-        if most is not None and (self.degree is None or self.degree > most):
-            _set(self, "degree", most)
-
-
-def conventions() -> Mapping[str, Convention]:
-    """List the conventions that `convert` knows by name, with their facts.
-
-    **Returns** a mapping that cannot be changed, from name to `Convention`.
-
-    **Example**
-
-    >>> from jaxsh import harmonics
-    >>> harmonics.conventions()["three.js"].axes  # its y, up, is our z
-    ('+x', '+z', '-y')
-    """
-    return _CONVENTIONS
-
-
-def look_up(name: str, convention: str | Convention) -> Convention:
-    """Find a convention by its name; raises `ValueError` that says the nearest."""
-    if isinstance(convention, Convention):
-        return convention
-    if isinstance(convention, str) and convention in _CONVENTIONS:
-        return _CONVENTIONS[convention]
-    raise ValueError(
-        f"expected {name} as a Convention or a name of harmonics.conventions(), got "
-        f"{described(convention)}{nearest(convention, _CONVENTIONS)}"
-    )
+            limits.append(max(l for l, _ in pairs))
+        else:
+            check_choice("order", self.order, ORDERS)
+        _set(self, "degree", min(limits, default=None))
 
 
 def places(convention: Convention, degree: int) -> Int[np.ndarray, " k"]:
@@ -134,7 +106,13 @@ def places(convention: Convention, degree: int) -> Int[np.ndarray, " k"]:
         return l * (l + 1) - m
     order = list(convention.order)
     pairs = zip(l.tolist(), m.tolist(), strict=True)
-    return np.array([order.index(pair) for pair in pairs], np.int32)
+    found = np.array([order.index(pair) for pair in pairs], np.int32)
+    if found.max() >= len(found):
+        raise ValueError(
+            f"expected coefficients of degree {convention.degree} for a convention with an order "
+            f"of its own, got degree {degree}"
+        )
+    return found
 
 
 def scales(convention: Convention, degree: int) -> Float[np.ndarray, " k"]:
@@ -209,99 +187,3 @@ def _checked_pairs(order) -> tuple[tuple[int, int], ...]:
             f"{described(order)}"
         )
     return pairs
-
-
-def _named() -> dict[str, Convention]:
-    polynomial = {"normalization": "polynomial", "quantity": "irradiance/pi"}
-    return {
-        "jaxsh": Convention(about="this package"),
-        "irradiance": Convention(
-            quantity="irradiance", about="this package, after the clamped cosine"
-        ),
-        "condon-shortley": Convention(
-            phase="condon-shortley", about="real harmonics with the sign (-1)^m, in any axes"
-        ),
-        "directxmath": Convention(
-            phase="condon-shortley", degree=5, about="DirectXMath XMSHEvalDirection"
-        ),
-        "kaolin": Convention(phase="condon-shortley", degree=2, about="Kaolin render.lighting.sh"),
-        "gaussian-splatting": Convention(
-            phase="condon-shortley",
-            layout="channels-last",
-            degree=4,
-            about="3D Gaussian splatting, features (N, K, 3); color = ½ + the function of the "
-            "direction from the eye to the splat",
-        ),
-        "three.js": Convention(
-            axes="y-up", layout="channels-last", degree=2, about="SphericalHarmonics3, LightProbe"
-        ),
-        "unity": Convention(
-            **polynomial,
-            axes=("-x", "+z", "-y"),
-            layout="by-channel",
-            degree=2,
-            about="SphericalHarmonicsL2, 27 floats [channel, coefficient]; left-handed, y up",
-        ),
-        "unreal": Convention(
-            phase="condon-shortley",
-            axes=("+x", "-y", "+z"),
-            about="FSHVector; left-handed, z up",
-        ),
-        "filament": Convention(
-            **polynomial,
-            axes="y-up",
-            layout="channels-last",
-            degree=2,
-            about="what IndirectLight::Builder::irradiance takes: cmgen --sh-shader and sh.txt",
-        ),
-        "filament-sh": Convention(
-            phase="condon-shortley",
-            axes="y-up",
-            layout="channels-last",
-            about="cmgen --sh",
-        ),
-        "filament-sh-irradiance": Convention(
-            phase="condon-shortley",
-            axes="y-up",
-            layout="channels-last",
-            quantity="irradiance",
-            about="cmgen --sh --sh-irradiance",
-        ),
-        "gltf": Convention(
-            axes="y-up",
-            layout="channels-last",
-            quantity="irradiance",
-            degree=2,
-            about="irradianceCoefficients of EXT_lights_image_based",
-        ),
-        **{
-            f"pyshtools-{name}": Convention(
-                normalization=normalization,
-                layout="cosine-sine",
-                about=f"SHCoeffs, normalization='{name}', csphase=1",
-            )
-            for name, normalization in (
-                ("4pi", "4pi"),
-                ("ortho", "orthonormal"),
-                ("schmidt", "schmidt"),
-                ("unnorm", "unnormalized"),
-            )
-        },
-        **{
-            f"e3nn-{name}": Convention(
-                normalization=normalization,
-                basis_axes="zxy",
-                about=f"spherical_harmonics, normalization='{name}'",
-            )
-            for name, normalization in (
-                ("component", "4pi"),
-                ("integral", "orthonormal"),
-                ("norm", "schmidt"),
-            )
-        },
-        "sphericart": Convention(about="sphericart.SphericalHarmonics"),
-        "habel": Convention(about="tables of Habel et al. 2008"),
-    }
-
-
-_CONVENTIONS: Mapping[str, Convention] = MappingProxyType(_named())

@@ -9,7 +9,8 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, as_float, described
 from .._core.linalg import matmul
-from ._convention import Convention, axes_matrix, look_up, places, scales
+from ._convention import Convention, axes_matrix, places, scales
+from ._conventions import look_up
 from ._indexing import degrees, num_coefficients, orders
 from ._turns import axes_blocks
 
@@ -145,9 +146,8 @@ def _pack(functions: Float[Array, "... k"], convention: Convention, degree: int)
         taken[slots] = np.arange(count)
         used = np.zeros(2 * count, bool)
         used[slots] = True
-        flat = jnp.where(
-            *align(jnp.asarray(used), functions[..., taken]), jnp.zeros((), functions.dtype)
-        )
+        used, flat = align(jnp.asarray(used), functions[..., taken])
+        flat = jnp.where(used, flat, jnp.zeros_like(flat))
         return flat.reshape(*functions.shape[:-1], 2, degree + 1, degree + 1)
     if convention.order != "ascending":
         functions = functions[..., np.argsort(places(convention, degree))]

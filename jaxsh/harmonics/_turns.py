@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 # Exchanges whose product is each order of the axes: f(x, y, z) → f with these arguments.
-_EXCHANGES = {
+_EXCHANGES: dict[tuple[int, ...], tuple[str, ...]] = {
     (0, 1, 2): (),
     (1, 0, 2): ("xy",),
     (2, 1, 0): ("xz",),
