@@ -132,8 +132,8 @@ def _windowed(
     if window != "dering light" and window != "dering irradiance":
         return light * harmonics.window(window, degree)[None], None
     of = "light" if window == "dering light" else "irradiance"
-    strength = jnp.max(harmonics.dering(light, of=of)[1])
-    return light * harmonics.damping(strength, degree)[None], float(strength)
+    windowed, strength = harmonics.dering(light, of=of, shared=True)
+    return windowed, float(strength)
 
 
 def _errors(shaded: Float[Array, "v 3"], exact: Float[Array, "v 3"]) -> dict[str, float]:

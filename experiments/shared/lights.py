@@ -70,6 +70,5 @@ def windowed(light: Float[Array, "3 k"], name: str) -> Float[Array, "3 k"]:
     if name == "none":
         return light
     if name == "dering":
-        strength = jnp.max(harmonics.dering(light, of="light")[1])
-        return light * harmonics.damping(strength, degree)[None]
+        return harmonics.dering(light, of="light", shared=True)[0]
     return light * harmonics.window(_KINDS[name], degree)[None]

@@ -13,7 +13,7 @@ from ._indexing import degree_of, degrees, index, num_coefficients, orders
 from ._products import gaunt, product, product_matrix, triple_integral
 from ._rotation import rotate, rotate_z, rotation_matrix
 from ._tables import legendre
-from ._windows import damping, window
+from ._windows import damping, softening, window
 from ._zonal import clamped_cosine, convolve, disc, phong
 
 __all__ = [
@@ -40,6 +40,7 @@ __all__ = [
     "rotate",
     "rotate_z",
     "rotation_matrix",
+    "softening",
     "triple_integral",
     "window",
 ]

@@ -1,4 +1,4 @@
-"""Search for the least window that leaves a light, or its irradiance, without negative values."""
+"""Search for the least window that leaves a light, or what is shaded by it, without negatives."""
 
 import functools
 from typing import Literal
@@ -8,77 +8,84 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import as_float, check_choice, check_coefficients
+from .._core.checks import align, as_float, check_choice, check_coefficients, check_flag
 from .._core.linalg import dot, einsum, matmul
 from .._core.xla import keep_rows, on_mesh
 from ._basis import evaluate
 from ._indexing import degrees, orders
 from ._tables import legendre
-from ._windows import damping
-from ._zonal import clamped_cosine, convolve
+from ._windows import softening
+from ._zonal import clamped_cosine, convolve, phong
 
-# Rounds of the search for the least strength; in each, valleys looked into and halvings.
-_CUTS, _VALLEYS, _HALVINGS = 16, 8, 60
+# Rounds of the search for the least strength, and valleys looked into in each.
+_CUTS, _VALLEYS = 16, 8
 
 
 def dering(
     coefficients: Float[ArrayLike, "*batch k"],
     *,
-    of: Literal["irradiance", "light"] = "irradiance",
-) -> tuple[Float[Array, "*batch k"], Float[Array, "*batch"]]:
-    """Window a light by the least `damping` that leaves it without negative values.
+    of: Literal["irradiance", "light", "glossy"] = "irradiance",
+    exponent: Float[ArrayLike, "*lobes"] | None = None,
+    shared: bool = False,
+) -> tuple[Float[Array, "*out k"], Float[Array, "*strengths"]]:
+    """Window a light by the least `softening` that leaves what it is for without negative values.
 
-    A truncated light rings: behind a bright source it goes below zero (Sloan 2008). A diffuse
-    surface sees the light convolved with the clamped cosine, which takes far less of a window, or
-    none.
+    A truncated light rings: behind a bright source it goes below zero (Sloan 2008). What a surface
+    makes of it rings less, since it sees the light convolved with its lobe: the wider the lobe, the
+    less of a window is needed, often none. Shadows undo that: an unshadowed surface without
+    negative irradiance may have some where it is shadowed.
 
     **Arguments**
 
-    - `coefficients`: (..., K). Each function of the batch, each color channel too, gets a window of
-      its own: for one window over the channels, use `damping` with the largest of their strengths.
-    - `of`: what must have no negative value: `"irradiance"`, that of unshadowed diffuse surfaces,
-      or `"light"`, the function itself, as for a picture of the light or a glossy surface.
+    - `coefficients`: (..., K).
+    - `of`: what must have no negative value: `"irradiance"`, that of unshadowed diffuse surfaces;
+      `"glossy"`, the light over Phong's lobe cosᵏ of this `exponent`, in any direction; or
+      `"light"`, the function itself, as for a picture of it or a mirror.
+    - `exponent`: (...), k of `"glossy"`, and None otherwise. Batches broadcast. Where a mesh has
+      several, the largest needs most. The cosine of a surface seen along its normal makes k + 1
+      of k.
+    - `shared`: one window for all functions on the last batch axis, the color channels of a light
+      (3, K), which keeps their hue where all are damped: the largest of their strengths.
 
-    **Returns** the windowed coefficients (..., K) and the strengths (...). What is left below zero
-    is under 1e-3 of the mean, and mostly far under. A function that needs no window is returned as
-    it is, with strength 0; one whose mean is not positive cannot be helped and keeps nothing but
-    its mean, with strength infinity; NaN gives NaN. Differentiable once, by the implicit function
-    theorem, with a kink where the strength reaches zero or the darkest direction jumps; a second
-    derivative raises `NotImplementedError`. Raises `ValueError` where K is not a square and for
-    another `of`.
-
-    **Cost** on five light probes (grace, galileo, eucalyptus, stpeters, uffizi): mean error of
-    irradiance over a mesh's normals in % of its mean, least to greatest of the probes, one window
-    for the three channels. `python -m experiments run environment --preset paper` prints it.
-
-    | window | degree 2 | degree 6 | degree 10 |
-    |---|---|---|---|
-    | none | 1.5–4.0 | 0.3–1.0 | 0.1–0.5 |
-    | `dering` | 1.5–14.2 | 0.3–1.0 | 0.1–0.5 |
-    | `window("lanczos")` | 6.8–18.4 | 1.9–4.0 | 0.9–1.7 |
-    | `window("hann")` | 9.2–24.5 | 2.5–5.8 | 1.2–2.5 |
-    | `dering(of="light")` | 2.3–27.6 | 1.5–32.2 | 0.8–32.3 |
-
-    By default four of the probes need a window at degree 1, one (grace) at degree 2 and none at 4,
-    6 and 10. The negative parts of their light are then 2–30 % of its integral, which a diffuse
-    surface does not see. Light with small bright sources loses most by `of="light"`, at any degree.
+    **Returns** the windowed coefficients (..., K) and the strengths (...), without the channels'
+    axis where it is `shared`. What is left below zero is under 1e-3 of the mean, and mostly far
+    under. A strength, for `softening`, is 0 where no window is needed: the function is returned as
+    it is. It is at most 1 for a light that had no negative value before it was projected, and 2,
+    which leaves the mean, where the mean is not positive: such a function cannot be helped. NaN
+    gives NaN. Differentiable once, in the exponent too, by the implicit function theorem, with
+    kinks where the strength reaches 0, 1 or 2 or the darkest direction jumps; a second derivative
+    raises `NotImplementedError`. Raises `ValueError` where K is not a square, for another `of`, for
+    an exponent that is missing, not asked for or not above -1, and for one function with `shared`.
 
     **Example**
 
     >>> import jax.numpy as jnp
     >>> from jaxsh import harmonics
-    >>> light = jnp.array([3.545, 0.0, 9.21, 0.0])  # 1 + 4.5 z
-    >>> _, for_surfaces = harmonics.dering(light)
-    >>> _, for_itself = harmonics.dering(light, of="light")
-    >>> round(float(for_surfaces), 1), round(float(for_itself), 1)
-    (0.5, 0.9)
+    >>> sun = harmonics.evaluate(jnp.array([0.0, 0.6, 0.8]), degree=4)  # small and bright
+    >>> light = jnp.stack([sun, 0.9 * sun, 0.7 * sun])
+    >>> diffuse, strength = harmonics.dering(light, shared=True)
+    >>> _, by_exponent = harmonics.dering(light[0], of="glossy", exponent=jnp.array([8.0, 128.0]))
+    >>> diffuse.shape, strength.shape, by_exponent.shape
+    ((3, 25), (), (2,))
+    >>> [round(float(s), 2) for s in (strength, *by_exponent)]
+    [0.28, 0.71, 0.99]
     """
     coefficients = as_float(coefficients, "coefficients")
     degree = check_coefficients("coefficients", coefficients)
-    check_choice("of", of, ("irradiance", "light"))
+    check_choice("of", of, ("irradiance", "light", "glossy"))
+    if (exponent is None) == (of == "glossy"):
+        got = "none" if exponent is None else "one"
+        raise ValueError(f'an exponent belongs to of="glossy", got {got} with of="{of}"')
+    shared = check_flag("shared", shared)
     judged = coefficients
     if of == "irradiance":
         judged = convolve(coefficients, clamped_cosine(degree))
+    elif exponent is not None:
+        judged = convolve(coefficients, phong(exponent, degree, normalized=True))
+    if shared and judged.ndim < 2:
+        raise ValueError(
+            f"a shared window is for several functions (..., C, K), got shape {judged.shape}"
+        )
 
     def least(judged):
         if judged.ndim > 1:
@@ -88,7 +95,17 @@ def dering(
     spec = (*jax.typeof(judged).sharding.spec, *[None] * judged.ndim)[: judged.ndim]
     rows = next((axis for axis, name in enumerate(spec) if name is not None), 0)
     strength = keep_rows(least, judged, like=judged, axis=rows, out=rows)
-    return coefficients * damping(strength, degree), strength
+    if not shared:
+        return _windowed(coefficients, strength, degree), strength
+    # No strength is below zero, which is what stands where there are no functions.
+    strength = jnp.max(strength, axis=-1, initial=0)
+    return _windowed(coefficients, strength[..., None], degree), strength
+
+
+def _windowed(
+    coefficients: Float[Array, "*batch k"], strength: Float[Array, "*out"], degree: int
+) -> Float[Array, "*all k"]:
+    return jnp.multiply(*align(coefficients, softening(strength, degree)))
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1,))
@@ -105,8 +122,8 @@ def _least_strength_jvp(degree, primals, tangents):
     basis = evaluate(direction, degree)
     bands = _band_sums(jax.lax.stop_gradient(coefficients) * basis, degree)
     slope = jax.grad(_value)(strength, bands)
-    regular = (strength > 0) & jnp.isfinite(strength) & (slope > 0)
-    gradient = -damping(strength, degree) * basis / jnp.where(regular, slope, 1)
+    regular = (strength > 0) & (strength < 2) & (slope > 0)
+    gradient = -softening(strength, degree) * basis / jnp.where(regular, slope, 1)
     gradient = _once(jnp.where(regular, gradient, 0), coefficients)
     return strength, dot(gradient, tangent)
 
@@ -133,7 +150,7 @@ def _search(
 
     def cut(_, state):
         strength, decisive = state
-        direction = _darkest(coefficients * damping(strength, degree), degree)
+        direction = _darkest(coefficients * softening(strength, degree), degree)
         bands = _band_sums(coefficients * evaluate(direction, degree), degree)
         negative = _value(strength, bands) < 0
         raised = jnp.where(negative, _root(bands, strength), strength)
@@ -151,22 +168,21 @@ def _search(
 def _value(strength: Float[Array, ""], bands: Float[Array, " bands"]) -> Float[Array, ""]:
     """A function's value under the window, from the sums of its bands in one direction."""
     first = np.arange(len(bands), dtype=np.int32) ** 2  # the window is constant over a band
-    return dot(damping(strength, len(bands) - 1)[first], bands)
+    return dot(softening(strength, len(bands) - 1)[first], bands)
 
 
 def _root(bands: Float[Array, " bands"], low: Float[Array, ""]) -> Float[Array, ""]:
-    """Strength above `low`, which is not enough, from which on one direction is not dark."""
-    mean, swing = bands[0], jnp.sum(jnp.abs(bands[1:]))
-    # On every band above the mean the window is at most 1/(4·strength): this much is enough.
-    enough = jnp.where(mean > 0, swing / (4 * jnp.where(mean > 0, mean, 1)), jnp.inf)
+    """Strength above `low`, which is not enough, from which on one direction is not dark.
 
-    def halve(_, bounds):
-        low, high = bounds
-        middle = (low + high) / 2
-        negative = _value(middle, bands) < 0
-        return jnp.where(negative, middle, low), jnp.where(negative, high, middle)
-
-    return jax.lax.fori_loop(0, _HALVINGS, halve, (low, jnp.maximum(enough, low)))[1]
+    The value goes along straight lines: from that without a window, at 0, over that under the
+    positive window, at 1, to the mean, at 2.
+    """
+    mean = bands[0]
+    zero, one = (_value(jnp.asarray(at, bands.dtype), bands) for at in (0, 1))
+    first = one > 0  # the first line ends above zero; it began below
+    above, below = jnp.where(first, one, mean), jnp.where(first, zero, one)
+    root = jnp.where(first, 0.0, 1.0) - below / jnp.where(above > below, above - below, 1)
+    return jnp.maximum(low, jnp.where(mean > 0, jnp.clip(root, 0, 2), 2))
 
 
 def _darkest(coefficients: Float[Array, " k"], degree: int) -> Float[Array, " 3"]:

@@ -1,5 +1,6 @@
 """Windows: factors per band against the ringing that leaves a truncated light negative."""
 
+import functools
 from typing import Literal
 
 import jax.numpy as jnp
@@ -9,11 +10,11 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import align, as_float, check_choice, check_degree, is_concrete
 from ._indexing import degrees, orders
 
-WINDOWS = ("none", "hann", "lanczos", "zonal-sinc")
+WINDOWS = ("none", "hann", "lanczos", "zonal-sinc", "positive")
 
 
 def window(
-    kind: Literal["none", "hann", "lanczos", "zonal-sinc"], degree: int
+    kind: Literal["none", "hann", "lanczos", "zonal-sinc", "positive"], degree: int
 ) -> Float[Array, " k"]:
     """Make a fixed window to multiply coefficients by, shape (K,) in JAX's default float type.
 
@@ -23,7 +24,10 @@ def window(
     - `"hann"`: (1 + cos(πl/N))/2;
     - `"lanczos"`: sinc(πl/N) = sin(πl/N)/(πl/N), also called the sinc window or Lanczos σ;
     - `"zonal-sinc"`: the same, but on m = 0 alone (Habel et al. 2008, eq. 5), for an edge along
-      the horizon.
+      the horizon;
+    - `"positive"`: of all windows whose kernel Σ (2l+1)/4π w_l P_l is nowhere negative, the nearest
+      to none, min Σ (2l+1) (1 - w_l)². Projected from any light without negative values, what is
+      under it has none either. The others promise nothing, or more blur.
 
     The stronger the window, the less ringing and the more blur: `dering` finds the least that a
     given light needs, and its docstring says what each costs. Raises `ValueError` for another
@@ -46,13 +50,16 @@ def window(
             values = np.sinc(l / bands)
         case "zonal-sinc":
             values = np.where(orders(degree) == 0, np.sinc(l / bands), 1.0)
+        case "positive":
+            values = _positive(degree)[l]
     return jnp.asarray(values, jnp.result_type(float))
 
 
 def damping(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "*batch k"]:
-    """Make the window 1 / (1 + strength·l²(l+1)²) that `dering` uses (Sloan 2008).
+    """Make the window 1 / (1 + strength·l²(l+1)²) of Sloan 2008.
 
-    It minimises the squared error plus `strength` times the squared Laplacian.
+    It minimises the squared error plus `strength` times the squared Laplacian. `dering` has a
+    better one, `softening`.
 
     **Arguments**
 
@@ -80,3 +87,73 @@ def damping(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "
     # The mean is set apart: an infinite strength times its zero would be NaN.
     damped = 1 / (1 + strength * jnp.where(squared > 0, squared, 1))
     return jnp.where(squared > 0, damped, jnp.ones_like(damped))
+
+
+def softening(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "*batch k"]:
+    """Make the window of `dering`: none at 0, `"positive"` at 1, nothing but the mean at 2.
+
+    Linear in between: the value of a windowed function in any direction is, too.
+
+    **Arguments**
+
+    - `strength`: (...), from 0 to 2. At 1 nothing is left negative of a light that had no negative
+      value before it was projected. Differentiable, with kinks at 0, 1 and 2.
+    - `degree`: the largest l, known at trace time.
+
+    **Returns** factors (..., K) in the dtype of the strength. Raises `ValueError` for a strength
+    outside, where its value is known before tracing.
+
+    **Example**
+
+    >>> from jaxsh import harmonics
+    >>> window = harmonics.softening(0.5, degree=1)  # halfway to 1, 1/3, 1/3, 1/3
+    >>> [round(float(w), 3) for w in window]
+    [1.0, 0.667, 0.667, 0.667]
+    """
+    strength, degree = as_float(strength, "strength"), check_degree(degree)
+    if is_concrete(strength):
+        known = np.asarray(strength)
+        if (outside := (known < 0) | (known > 2)).any():
+            raise ValueError(
+                f"a window's strength must be from 0 to 2, got {known[outside].flat[0]:g}"
+            )
+    strength = strength[..., None]
+    l = degrees(degree)
+    strength, positive, higher = align(
+        strength,
+        jnp.asarray(_positive(degree)[l], strength.dtype),
+        jnp.asarray(l > 0, strength.dtype),
+    )
+    to_mean = jnp.clip(strength - 1, 0, 1)
+    return 1 - higher * (positive * to_mean + (1 - positive) * jnp.clip(strength, 0, 1))
+
+
+@functools.cache
+def _positive(degree: int) -> Float[np.ndarray, " bands"]:
+    """The window `"positive"`, by band.
+
+    With u_l = √(2l+1) w_l it is the point nearest to (√(2l+1)) where Σ u_l √(2l+1) P_l(z) >= 0 at
+    all z and u_0 = 1: least distance programming, which is non-negative least squares in disguise
+    (Lawson & Hanson 1974, ch. 23).
+    """
+    if degree == 0:
+        return np.ones(1)
+    from scipy.optimize import nnls
+
+    scale = np.sqrt(2 * np.arange(degree + 1) + 1.0)
+
+    def kernels(count: int) -> Float[np.ndarray, "z bands"]:
+        z = np.cos(np.linspace(0, np.pi, count * (degree + 1)))
+        return np.polynomial.legendre.legvander(z, degree) * scale
+
+    # y = u - scale, but for its first, which is 0: the shortest y with G y >= -G scale.
+    kernel = kernels(64)
+    system = np.vstack([kernel[:, 1:].T, -(kernel @ scale)])
+    aim = np.eye(degree + 1)[-1]
+    residual = system @ nnls(system, aim, maxiter=100 * degree)[0] - aim
+    u = scale + np.append(0, -residual[:-1] / residual[-1])
+    # Between the points it dips below zero, ever so little beside its mean, which is 1.
+    dip = max(0.0, -float((kernels(512) @ u).min()))
+    window = u / scale / (1 + dip)
+    window[0] = 1
+    return window

@@ -67,6 +67,7 @@ def test_products_and_kernels(rng):
             harmonics.convolve(f, harmonics.clamped_cosine(2)),
             harmonics.damping(exponents, 2),
             harmonics.disc(exponents, 2),
+            harmonics.softening(exponents / 9, 2),
         )
 
     f, g, exponents = (
@@ -101,7 +102,8 @@ def test_a_large_product_is_one_call(rng):
 def test_dering_and_its_gradient(shape, rng):
     def everything(c):
         (clean, strength), pull = jax.vjp(harmonics.dering, c)
-        return clean, strength, pull((jnp.ones_like(clean), jnp.ones_like(strength)))[0]
+        slope = pull((jnp.ones_like(clean), jnp.ones_like(strength)))[0]
+        return clean, strength, slope, harmonics.dering(c, of="glossy", exponent=9.0)
 
     c = rng.normal(size=shape)
     c[..., 0] = np.abs(c[..., 0]) + 0.5

@@ -32,8 +32,8 @@ def calls():
         "damping": of(h.damping, strength=floats(), degree=2),
         "degree_of": of(h.degree_of, count=9),
         "degrees": of(h.degrees, degree=2),
-        "dering": of(h.dering, coefficients=f, of="irradiance"),
         "disc": of(h.disc, solid_angle=floats(), degree=2, finite="solid_angle"),
+        "dering": of(h.dering, coefficients=f, of="glossy", exponent=np.array(8.0), shared=False),
         "evaluate": of(h.evaluate, vectors=vectors, degree=2, axis=-1),
         "evaluate_with_gradient": of(h.evaluate_with_gradient, vectors=vectors, degree=2, axis=-1),
         "gaunt": of(h.gaunt, degree=1),
@@ -47,6 +47,7 @@ def calls():
         "rotate": of(h.rotate, coefficients=f, rotation=np.eye(3), finite="rotation"),
         "rotate_z": of(h.rotate_z, coefficients=f, angle=floats()),
         "rotation_matrix": of(h.rotation_matrix, rotation=np.eye(3), degree=2, finite="rotation"),
+        "softening": of(h.softening, strength=np.array(0.5), degree=2),
         "triple_integral": of(h.triple_integral, f=f, g=f, h=f),
         "window": of(h.window, kind="hann", degree=2),
     }
