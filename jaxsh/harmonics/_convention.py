@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .._core.checks import check_choice, check_degree, check_type, described
+from .._core.host import read_only_cache
 from ._indexing import degrees, num_coefficients, orders
 
 PHASES = "none", "condon-shortley"
@@ -129,11 +130,12 @@ def scales(convention: Convention, degree: int) -> Float[np.ndarray, " k"]:
     return np.where((m % 2 == 1) & (convention.phase != "none"), -scale, scale)
 
 
+@read_only_cache(maxsize=None)
 def _unnormalized(degree: int) -> Float[np.ndarray, " k"]:
-    """√((l+m)! / (l-m)!) / √((2-δ)(2l+1)), by products of factors near each other."""
+    """√((l+m)! / (l-m)!) / √((2-δ)(2l+1)); infinite where that is more than a float holds."""
     l, m = degrees(degree), np.abs(orders(degree))
-    pairs = zip(l.tolist(), m.tolist(), strict=True)
-    ratio = np.array([math.sqrt(math.prod(range(a - b + 1, a + b + 1))) for a, b in pairs])
+    factors = (range(a - b + 1, a + b + 1) for a, b in zip(l.tolist(), m.tolist(), strict=True))
+    ratio = np.array([math.prod(map(math.sqrt, some)) for some in factors])
     return ratio / np.sqrt(np.where(m == 0, 1, 2) * (2 * l + 1))
 
 

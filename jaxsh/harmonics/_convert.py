@@ -92,7 +92,8 @@ def _rounded(values: Float[np.ndarray, "..."], dtype) -> Float[Array, "..."]:
     """Round to a dtype what was computed in float64, or say that it does not fit."""
     with np.errstate(over="ignore", under="ignore"):
         rounded = values.astype(dtype)
-    if not np.isfinite(rounded).all() or ((rounded == 0) & (values != 0)).any():
+    least = float(jnp.finfo(dtype).tiny)
+    if not np.isfinite(rounded).all() or (np.abs(values[values != 0]) < least).any():
         raise ValueError(
             f"the factors of these conventions do not fit into the dtype {np.dtype(dtype)} of "
             "coefficients: expected a lower degree, or float64"
