@@ -3,11 +3,13 @@
 import functools
 import math
 
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import align, as_float, described
+from .._core.checks import align, as_float
+from .._core.host import read_only_cache
 from .._core.linalg import matmul
 from ._convention import Convention, axes_matrix, places, scales
 from ._conventions import look_up
@@ -44,131 +46,167 @@ def convert(
     ((3, 9), 2)
     """
     source, target = look_up("source", source), look_up("target", target)
-    functions, degree = _unpack(as_float(coefficients, "coefficients"), source)
+    array = as_float(coefficients, "coefficients")
+    degree = _check_layout(array.shape, source.layout)
     for name, convention in (("source", source), ("target", target)):
         if convention.degree is not None and degree > convention.degree:
             raise ValueError(
                 f"the {name} has coefficients up to degree {convention.degree}, expected no more, "
                 f"got degree {degree}"
             )
-    factors = _factors(source, target, degree)
-    incoming, outgoing = scales(source, degree), 1 / scales(target, degree)
-    turn = axes_matrix(target) @ axes_matrix(source).T
-    if (turn == np.eye(3)).all():
-        scale = _rounded(incoming * outgoing * factors, functions.dtype)
-        functions = jnp.multiply(*align(functions, scale))
+    _check_channels(array.shape, source.layout, target.layout)
+    matrices = _matrices(source, target, degree)
+    _check_range(matrices, array.dtype)
+    return _convert(array, source, target, degree)
+
+
+@functools.partial(jax.jit, static_argnums=(1, 2, 3))
+def _convert(
+    array: Float[Array, "..."], source: Convention, target: Convention, degree: int
+) -> Float[Array, "..."]:
+    functions = _unpack(array, source, degree)
+    matrices = [matrix.astype(array.dtype) for matrix in _matrices(source, target, degree)]
+    if len(matrices) == 1:
+        functions = jnp.multiply(*align(functions, jnp.asarray(matrices[0])))
     else:
-        bands = []
-        for l, block in enumerate(axes_blocks(tuple(map(tuple, turn.tolist())), degree)):
-            band = slice(l * l, (l + 1) ** 2)
-            matrix = outgoing[band, None] * block * (incoming * factors)[band]
-            bands.append(matmul(functions[..., band], _rounded(matrix, functions.dtype).T))
-        functions = jnp.concatenate(bands, axis=-1)
+        bands = [functions[..., l * l : (l + 1) ** 2] for l in range(degree + 1)]
+        turned = [matmul(band, matrix.T) for band, matrix in zip(bands, matrices, strict=True)]
+        functions = jnp.concatenate(turned, axis=-1)
     return _pack(functions, target, degree)
 
 
-def _factors(source: Convention, target: Convention, degree: int) -> Float[np.ndarray, " k"]:
-    """Multiply to turn one quantity into the other, for each coefficient."""
-    factor = np.ones(num_coefficients(degree))
-    if source.quantity == target.quantity:
-        return factor
-    lambdas = np.array([math.pi, 2 * math.pi / 3, math.pi / 4])
-    for convention, power in ((source, -1), (target, 1)):
-        if convention.quantity == "irradiance/pi":
-            factor = factor / math.pi**power
-    crossed = (source.quantity == "radiance") != (target.quantity == "radiance")
-    if not crossed:
-        return factor
+@read_only_cache(maxsize=256)
+def _matrices(source: Convention, target: Convention, degree: int) -> list[np.ndarray]:
+    """Combine all but order and layout: a matrix for each degree, or one row of factors.
+
+    In float64, so that all is rounded once.
+    """
+    incoming = scales(source, degree) * _quantity_factors(source, target, degree)
+    outgoing = 1 / scales(target, degree)
+    turn = axes_matrix(target) @ axes_matrix(source).T
+    if (turn == np.eye(3)).all():
+        return [incoming * outgoing]
+    bands = [slice(l * l, (l + 1) ** 2) for l in range(degree + 1)]
+    blocks = zip(bands, axes_blocks(tuple(map(tuple, turn.tolist())), degree), strict=True)
+    return [outgoing[band, None] * block * incoming[band] for band, block in blocks]
+
+
+def _quantity_factors(
+    source: Convention, target: Convention, degree: int
+) -> Float[np.ndarray, " k"]:
+    """Factors that turn one quantity into the other, for each coefficient."""
+    per_unit = {"radiance": 1.0, "irradiance": 1.0, "irradiance/pi": math.pi}
+    factors = np.full(num_coefficients(degree), per_unit[source.quantity])
+    factors = factors / per_unit[target.quantity]
+    seen = [convention.quantity != "radiance" for convention in (source, target)]
+    if seen[0] == seen[1]:
+        return factors
     if degree > 2:
         raise ValueError(
             "between radiance and irradiance expected coefficients up to degree 2, since the "
             f"clamped cosine has no bands 3, 5, …, got degree {degree}"
         )
-    lambdas = lambdas[degrees(degree)]
-    return factor * lambdas if source.quantity == "radiance" else factor / lambdas
+    lambdas = np.array([math.pi, 2 * math.pi / 3, math.pi / 4])[degrees(degree)]
+    return factors / lambdas if seen[0] else factors * lambdas
 
 
-def _rounded(values: Float[np.ndarray, "..."], dtype) -> Float[Array, "..."]:
-    """Round to a dtype what was computed in float64, or say that it does not fit."""
-    with np.errstate(over="ignore", under="ignore"):
-        rounded = values.astype(dtype)
-    least = float(jnp.finfo(dtype).tiny)
-    if not np.isfinite(rounded).all() or (np.abs(values[values != 0]) < least).any():
-        raise ValueError(
-            f"the factors of these conventions do not fit into the dtype {np.dtype(dtype)} of "
-            "coefficients: expected a lower degree, or float64"
-        )
-    return jnp.asarray(rounded)
+def _check_range(matrices: list[np.ndarray], dtype) -> None:
+    """Raises `ValueError` where factors are too large or too small for a dtype."""
+    most, least = float(jnp.finfo(dtype).max), float(jnp.finfo(dtype).tiny)
+    for matrix in matrices:
+        size = np.abs(matrix[matrix != 0])
+        if not ((size >= least) & (size <= most)).all():
+            raise ValueError(
+                f"the factors of these conventions do not fit into the dtype {dtype} of "
+                "coefficients: expected a lower degree, or float64"
+            )
 
 
-def _unpack(array: Float[Array, "..."], convention: Convention):
-    """Bring coefficients into our order on the last axis, and find their degree."""
-    shape, layout = array.shape, convention.layout
-    expected, count, channels = "(..., K)", 0, 1
-    if layout == "coefficients-last":
-        count = shape[-1] if shape else 0
+_SHAPES = {
+    "coefficients-last": "(..., K)",
+    "channels-last": "(..., K, C)",
+    "by-channel": "(..., 3·K)",
+    "by-coefficient": "(..., 3·K)",
+    "cosine-sine": "(..., 2, degree + 1, degree + 1)",
+}
+
+
+def _check_layout(shape: tuple[int, ...], layout: str) -> int:
+    """The degree of coefficients in a layout; raises `ValueError` where a shape does not fit."""
+    last = (*([0] * 3), *shape)[-3:]
+    if layout == "cosine-sine":
+        count = last[2] ** 2 if last[0] == 2 and last[1] == last[2] else 0
+    elif layout == "coefficients-last":
+        count = last[2]
     elif layout == "channels-last":
-        expected, count = "(..., K, C)", shape[-2] if len(shape) > 1 else 0
-    elif layout == "cosine-sine":
-        expected = "(..., 2, degree + 1, degree + 1)"
-        if len(shape) > 2 and shape[-3] == 2 and shape[-2] == shape[-1]:
-            count = shape[-1] ** 2
+        count = last[1]
     else:
-        expected, channels = "(..., 3·K)", 3
-        count = shape[-1] // 3 if shape and shape[-1] % 3 == 0 else 0
+        count = 0 if last[2] % 3 else last[2] // 3
     degree = math.isqrt(count) - 1
     if degree < 0 or (degree + 1) ** 2 != count:
         raise ValueError(
-            f"expected coefficients {expected} with K = (degree + 1)² = 1, 4, 9, 16, …, layout "
-            f"{layout!r}, got shape {shape}"
+            f"expected coefficients {_SHAPES[layout]} with K = (degree + 1)² = 1, 4, 9, 16, …, "
+            f"layout {layout!r}, got shape {shape}"
         )
-    if layout == "channels-last":
-        array = jnp.swapaxes(array, -1, -2)
-    elif layout == "by-channel":
-        array = array.reshape(*shape[:-1], channels, count)
+    return degree
+
+
+def _check_channels(shape: tuple[int, ...], source: str, target: str) -> None:
+    """Raises `ValueError` where a layout with channels is to be made of what has none, or not 3."""
+    channels = {
+        "coefficients-last": shape[-2:-1],
+        "channels-last": shape[-1:],
+        "cosine-sine": shape[-4:-3],
+    }.get(source, (3,))
+    if target == "channels-last" and not channels:
+        raise ValueError(
+            f"expected coefficients of some channels for the layout {target!r}, got shape {shape} "
+            f"in the layout {source!r}"
+        )
+    if target in ("by-channel", "by-coefficient") and channels != (3,):
+        raise ValueError(
+            f"expected coefficients of 3 channels for the layout {target!r}, got shape {shape} in "
+            f"the layout {source!r}"
+        )
+
+
+def _unpack(array: Float[Array, "..."], convention: Convention, degree: int) -> Float[Array, "..."]:
+    """Bring coefficients into our order on the last axis."""
+    layout, count = convention.layout, num_coefficients(degree)
+    if layout == "cosine-sine":
+        flat = array.reshape(*array.shape[:-3], 2 * count)
+        return flat[..., _cosine_sine(degree)]
+    if layout == "by-channel":
+        array = array.reshape(*array.shape[:-1], 3, count)
     elif layout == "by-coefficient":
-        array = jnp.swapaxes(array.reshape(*shape[:-1], count, channels), -1, -2)
-    elif layout == "cosine-sine":
-        flat = array.reshape(*shape[:-3], 2 * count)
-        return flat[..., _cosine_sine(degree)], degree
-    if convention.order != "ascending" and (
-        convention.degree is None or degree <= convention.degree
-    ):
-        array = array[..., places(convention, degree)]
-    return array, degree
+        array = array.reshape(*array.shape[:-1], count, 3)
+    if layout in ("channels-last", "by-coefficient"):
+        array = jnp.swapaxes(array, -1, -2)
+    if convention.order == "ascending":
+        return array
+    return array[..., places(convention, degree)]
 
 
-def _pack(functions: Float[Array, "... k"], convention: Convention, degree: int):
+def _pack(functions: Float[Array, "..."], convention: Convention, degree: int):
     """Bring coefficients from our order on the last axis into a layout."""
     layout, count = convention.layout, num_coefficients(degree)
     if layout == "cosine-sine":
         slots = _cosine_sine(degree)
-        taken = np.zeros(2 * count, np.int32)
-        taken[slots] = np.arange(count)
-        used = np.zeros(2 * count, bool)
-        used[slots] = True
+        taken, used = np.zeros(2 * count, np.int32), np.zeros(2 * count, bool)
+        taken[slots], used[slots] = np.arange(count), True
         used, flat = align(jnp.asarray(used), functions[..., taken])
         flat = jnp.where(used, flat, jnp.zeros_like(flat))
         return flat.reshape(*functions.shape[:-1], 2, degree + 1, degree + 1)
     if convention.order != "ascending":
         functions = functions[..., np.argsort(places(convention, degree))]
-    if layout == "coefficients-last":
-        return functions
-    if functions.ndim < 2 or (layout != "channels-last" and functions.shape[-2] != 3):
-        channels = "C" if layout == "channels-last" else "3"
-        raise ValueError(
-            f"expected coefficients of {channels} channels for the layout {layout!r}, (..., "
-            f"{channels}, K) in ours, got {described(functions)}"
-        )
-    if layout != "by-channel":
+    if layout in ("channels-last", "by-coefficient"):
         functions = jnp.swapaxes(functions, -1, -2)
-    if layout == "channels-last":
-        return functions
-    return functions.reshape(*functions.shape[:-2], 3 * count)
+    if layout in ("by-channel", "by-coefficient"):
+        return functions.reshape(*functions.shape[:-2], 3 * count)
+    return functions
 
 
-@functools.cache
-def _cosine_sine(degree: int) -> np.ndarray:
+def _cosine_sine(degree: int) -> Int[np.ndarray, " k"]:
     """Places of our coefficients in (2, L+1, L+1), flattened."""
     l, m = degrees(degree), orders(degree)
     return np.where(m < 0, degree + 1, 0) * (degree + 1) + l * (degree + 1) + np.abs(m)

@@ -29,7 +29,8 @@ def test_every_pair_to_and_fro(rng):
     light = rng.normal(size=(3, 9))
     said = {name: harmonics.convert(light, "jaxsh", name) for name in NAMES}
     for source, target in itertools.permutations(NAMES, 2):
-        there = harmonics.convert(said[source], source, target)
+        with jax.disable_jit():  # 500 programs, each for one call
+            there = harmonics.convert(said[source], source, target)
         assert there.shape == SHAPES[harmonics.conventions()[target].layout]
         np.testing.assert_allclose(there, said[target], rtol=0, atol=4e-14)
 
@@ -52,15 +53,15 @@ def test_all_axes_against_scipy(rng):
 
 
 def test_axes_of_a_high_degree(rng):
-    """Degree 60: no digit is lost, where a recursion would lose them."""
+    """Degree 30: no digit is lost, where a recursion would lose them."""
     directions = oracles.unit_vectors(rng, 3)
     turn = ((0, 0, 1), (-1, 0, 0), (0, 1, 0))
-    block = axes_blocks(turn, 60)[60]
-    np.testing.assert_allclose(block @ block.T, np.eye(121), rtol=0, atol=2e-15)
+    block = axes_blocks(turn, 30)[30]
+    np.testing.assert_allclose(block @ block.T, np.eye(61), rtol=0, atol=2e-15)
     basis, turned = (
-        oracles.scipy_basis(d, 60)[:, 3600:] for d in (directions, directions @ np.array(turn))
+        oracles.scipy_basis(d, 30)[:, 900:] for d in (directions, directions @ np.array(turn))
     )
-    np.testing.assert_allclose(basis @ block, turned, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(basis @ block, turned, rtol=0, atol=1e-13)
 
 
 def test_up_is_a_rotation(rng):
@@ -161,7 +162,7 @@ def test_dtypes_and_transforms(rng):
         ((3, 16), "jaxsh", "three.js", "target has coefficients up to degree 2"),
         ((16, 3), "gltf", "jaxsh", "source has coefficients up to degree 2"),
         ((3, 16), "jaxsh", "irradiance", "the clamped cosine has no bands 3, 5"),
-        ((9,), "jaxsh", "three.js", "of C channels"),
+        ((9,), "jaxsh", "three.js", "of some channels"),
         ((2, 9), "jaxsh", "unity", "of 3 channels"),
         ((), "jaxsh", "e3nn-norm", r"got shape \(\)"),
     ],

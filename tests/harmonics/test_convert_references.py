@@ -42,12 +42,18 @@ def ours_at(light, name, directions):
     )
 
 
-def references(entry):
-    package = entry["package"].split()[0]
-    return pytest.param(entry, id=f"{entry['convention']}, {entry['function']} of {package}")
+def parameters():
+    """One entry for each package in the default run, the rest with the slow tests."""
+    seen = set()
+    for entry in REFERENCES:
+        package = entry["package"].split()[0]
+        said = f"{entry['convention']}, {entry['function']} of {package}"
+        more = package in {"pyshtools", "e3nn-jax"} and package in seen
+        seen.add(package)
+        yield pytest.param(entry, id=said, marks=pytest.mark.slow if more else ())
 
 
-@pytest.mark.parametrize("entry", [references(entry) for entry in REFERENCES])
+@pytest.mark.parametrize("entry", list(parameters()))
 def test_the_packages_own_function(entry):
     name = entry["convention"]
     convention = dataclasses.replace(harmonics.conventions()[name], **entry.get("facts", {}))
@@ -127,25 +133,6 @@ def test_published_polynomials(name, rng):
     found = function(np.asarray(given), *directions.T)
     np.testing.assert_allclose(found, ours_at(light * factor, name, directions), rtol=0, atol=2e-14)
     np.testing.assert_allclose(harmonics.convert(given, name, "jaxsh"), light, rtol=0, atol=2e-14)
-
-
-def test_a_white_sky_in_every_engine():
-    """Radiance 1 all around: irradiance π, so that a white surface leaves 1."""
-    light = np.zeros((3, 9))
-    light[:, 0] = np.sqrt(4 * np.pi)
-    first = {name: harmonics.convert(light, "jaxsh", name).ravel()[0] for name in ENGINES}
-    np.testing.assert_allclose(
-        [first[name] for name in ENGINES], list(ENGINES.values()), rtol=1e-14
-    )
-
-
-ENGINES = {
-    "unity": 1,
-    "filament": 1,
-    "gltf": np.pi * np.sqrt(4 * np.pi),
-    "three.js": np.sqrt(4 * np.pi),
-    "unreal": np.sqrt(4 * np.pi),
-}
 
 
 def test_every_convention_is_proved():
