@@ -54,7 +54,8 @@ REASONS = {
         "preetham_fit": NO_ARRAYS,
         "xyz_to_srgb": NO_ARRAYS,
     },
-    "sphere": dict.fromkeys(["cube_map", "fibonacci", "gauss_legendre", "lat_long"], NO_ARRAYS),
+    "sphere": dict.fromkeys(["cube_map", "fibonacci", "gauss_legendre", "lat_long"], NO_ARRAYS)
+    | {"split_sun": HOST},
     "transfer": {"bake": HOST, "load": NO_ARRAYS, "save": HOST},
 }
 

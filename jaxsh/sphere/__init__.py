@@ -3,6 +3,7 @@
 from ._lat_long import project_lat_long, reconstruct_lat_long
 from ._project import irradiance, project, reconstruct
 from ._quadrature import Quadrature, cube_map, fibonacci, gauss_legendre, lat_long
+from ._split_sun import split_sun
 from ._suns import Suns
 
 __all__ = [
@@ -17,4 +18,5 @@ __all__ = [
     "project_lat_long",
     "reconstruct",
     "reconstruct_lat_long",
+    "split_sun",
 ]

@@ -100,7 +100,7 @@ class Suns(eqx.Module):
                 raise ValueError(f"count must divide the {has} vectors of the shape, got {count}")
             groups = self.shape.astype(dtype).reshape(suns, count, has // count, 3)
             local = _unit(groups.sum(axis=2)) if count < has else groups[:, :, 0]
-        return einsum("sij,snj->sni", _frames(self.direction), local)
+        return einsum("sij,snj->sni", local_frames(self.direction), local)
 
     def harmonics(self, degree: int) -> Float[Array, "3 k"]:
         """Project all of the sources onto the basis: coefficients of their light together.
@@ -141,7 +141,9 @@ class Suns(eqx.Module):
         direction = einsum("ij,sj->si", turn, self.direction)
         shape = self.shape
         if shape is not None:
-            back = einsum("sji,jk,skl->sil", _frames(direction), turn, _frames(self.direction))
+            back = einsum(
+                "sji,jk,skl->sil", local_frames(direction), turn, local_frames(self.direction)
+            )
             shape = einsum("sij,snj->sni", back.astype(shape.dtype), shape)
         return Suns(direction, self.solid_angle, self.radiance, shape)
 
@@ -150,7 +152,7 @@ def _unit(vectors: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3"]:
     return vectors / jnp.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def _frames(direction: Float[Array, "s 3"]) -> Float[Any, "s 3 3"]:
+def local_frames(direction: Float[Array, "s 3"]) -> Float[Any, "s 3 3"]:
     """Rotations whose last column is the direction: Duff et al. 2017, "Building an orthonormal
     basis, revisited", smooth in each of the hemispheres about the z axis.
     """

@@ -36,4 +36,15 @@ def calls():
         "reconstruct_lat_long": of(
             s.reconstruct_lat_long, coefficients=floats(3, K), height=4, width=8
         ),
+        "split_sun": of(
+            s.split_sun,
+            image=floats(6, 12, 3) + 100 * (np.arange(72).reshape(6, 12, 1) == 40),
+            count=1,
+            threshold=4.0,
+            largest=0.5,
+            least=0.4,
+            rays=4,
+            host=True,
+            finite="image",
+        ),
     }

@@ -1,0 +1,117 @@
+"""Bright regions of a lat-long picture, found on a coarse copy: connected pixels above a level.
+
+Runs on the host. A region is given by the cells of the coarse copy, which stand for blocks of the
+picture's pixels; the picture goes on over its seam and over its poles.
+"""
+
+import itertools
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.ndimage
+from jaxtyping import Bool, Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ._quadrature import fejer_weights
+
+_ROWS = 256  # of the coarse copy: 0.7° to a cell, a little more than the sun is wide
+_STEP = 1.25  # from level to level
+_EIGHT = np.ones((3, 3))
+
+
+class Coarse(NamedTuple):
+    """A picture's brightness by cells, and which of its rows and columns each cell has."""
+
+    brightness: Float[np.ndarray, "h w"]  # mean over the cell, all channels summed
+    solid_angle: Float[np.ndarray, "h w"]
+    rows: Int[np.ndarray, " h+1"]
+    columns: Int[np.ndarray, " w+1"]
+
+    @classmethod
+    def of(cls, image: Float[np.ndarray, "H W c"]) -> "Coarse":
+        height, width, _ = image.shape
+        block = -(-height // _ROWS)
+        rows, columns = _edges(height, block), _edges(width, block)
+        weights = fejer_weights(height) * 2 * np.pi / width
+        counts = np.diff(columns)
+        flux = np.empty((len(rows) - 1, len(columns) - 1))
+        solid_angle = np.empty_like(flux)
+        for i, (first, last) in enumerate(itertools.pairwise(rows)):
+            weight = weights[first:last]
+            row = np.einsum("hwc,h->w", image[first:last], weight, dtype=np.float64)
+            flux[i] = np.add.reduceat(row, columns[:-1])
+            solid_angle[i] = weight.sum() * counts
+        return cls(flux / solid_angle, solid_angle, rows, columns)
+
+    def level(self, threshold: float) -> float:
+        """The mean m of the brightness where that is cut off at `threshold` times m itself.
+
+        What is above does not enter, so that one bright source does not hide the next.
+        """
+        mean = np.average(self.brightness, weights=self.solid_angle)
+        for _ in range(200):
+            cut = np.minimum(self.brightness, threshold * mean)
+            last, mean = mean, np.average(cut, weights=self.solid_angle)
+            if mean >= 0.999 * last:
+                break
+        return float(mean)
+
+    def regions(
+        self, level: float, *, largest: float, least: float
+    ) -> Iterator[Bool[np.ndarray, "h w"]]:
+        """Connected cells above `level`, each at the lowest level at which it is small enough.
+
+        What is wider than `largest` steradians is looked at again at the next level, where it
+        falls apart, down to the last peak. What sheds less than `least` is left out.
+        """
+        flux = self.brightness * self.solid_angle
+        waiting = [(level, self.brightness > level)]
+        while waiting:
+            level, mask = waiting.pop()
+            labels, count = _label(mask)
+            areas, fluxes = (
+                np.bincount(labels.ravel(), x.ravel(), count + 1) for x in (self.solid_angle, flux)
+            )
+            found = fluxes >= least
+            found[0] = False
+            for region in np.flatnonzero(found & (areas <= largest)):
+                yield labels == region
+            wide = (found & (areas > largest))[labels]
+            if wide.any():
+                level *= _STEP
+                waiting.append((level, wide & (self.brightness > level)))
+
+
+def grown(mask: Bool[np.ndarray, "h w"], reach: int) -> Bool[np.ndarray, "h w"]:
+    """Cells of a mask and all that are up to `reach` cells away from it, on the sphere."""
+    for _ in range(reach):
+        wrapped = np.concatenate([mask[:, -1:], mask, mask[:, :1]], axis=1)
+        mask = scipy.ndimage.binary_dilation(wrapped, _EIGHT)[:, 1:-1]
+        for pole in (0, -1):
+            mask[pole] |= mask[pole].any()
+    return mask
+
+
+def _edges(count: int, block: int) -> Int[np.ndarray, " n"]:
+    return np.append(np.arange(0, count, block), count)
+
+
+def _label(mask: Bool[np.ndarray, "h w"]) -> tuple[Int[np.ndarray, "h w"], int]:
+    """Number the connected cells of a mask from 1, across the seam and the poles too."""
+    numbered: Any = scipy.ndimage.label(mask, _EIGHT)
+    labels, count = numbered
+    first, last = labels[:, 0], labels[:, -1]
+    pairs = [np.stack([last, np.roll(first, shift)]) for shift in (-1, 0, 1)]
+    pairs[0][:, -1], pairs[2][:, 0] = 0, 0  # no row is beside the one at the other pole
+    for row in (labels[0], labels[-1]):  # all of its cells touch the pole
+        lit = row[row > 0]
+        if lit.size:
+            pairs.append(np.stack([lit, np.full_like(lit, lit[0])]))
+    a, b = np.concatenate(pairs, axis=1)
+    both = (a > 0) & (b > 0)
+    links = coo_array((np.ones(both.sum()), (a[both], b[both])), shape=(count + 1, count + 1))
+    joined, number = connected_components(links, directed=False)
+    # Number 0 is the background's, which has no link.
+    return number[labels], joined - 1
