@@ -22,9 +22,13 @@ if _TYPE_CHECKING:
     from . import sky as sky
     from . import sphere as sphere
     from . import transfer as transfer
+    from ._check import Verdict as Verdict
+    from ._check import check as check
 
 __all__ = [
+    "Verdict",
     "adaptive",
+    "check",
     "geometry",
     "harmonics",
     "imaging",
@@ -38,7 +42,13 @@ __all__ = [
 __version__ = "0.1.0"
 
 
+# What is no module but stands at the top, and where it is defined.
+_ELSEWHERE = {"Verdict": "_check", "check": "_check"}
+
+
 def __getattr__(name: str):
+    if name in _ELSEWHERE:
+        return getattr(_importlib.import_module(f".{_ELSEWHERE[name]}", __name__), name)
     if name in __all__:
         return _importlib.import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {__all__}")

@@ -6,6 +6,7 @@ import pathlib
 import subprocess
 import sys
 
+import faces
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[1]
@@ -68,8 +69,9 @@ def test_modules_are_listed_and_others_refused():
     import jaxsh
 
     assert set(jaxsh.__all__) < set(dir(jaxsh))
-    for module in jaxsh.__all__:
+    for module in faces.MODULES:
         assert getattr(jaxsh, module).__name__ == f"jaxsh.{module}"
+    assert [callable(getattr(jaxsh, name)) for name in faces.TOP] == [True] * len(faces.TOP)
     with pytest.raises(AttributeError, match=r"no attribute 'kitchen'; it has .*'harmonics'"):
         _ = jaxsh.kitchen
 

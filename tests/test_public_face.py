@@ -5,15 +5,15 @@ import importlib
 import inspect
 from pathlib import Path
 
+import faces
 import pytest
-
-import jaxsh
 
 TESTS = Path(__file__).parent
 NO_ARRAYS = "takes numbers or names, or reads or writes a file"
 HOST = "runs in NumPy on the host, as its docstring says"
 ONE = "takes one picture, camera or mesh: nothing in it is shared out"
 REASONS = {
+    "_check": {"check": HOST},
     "adaptive": {},
     "geometry": {
         "from_trimesh": HOST,
@@ -66,7 +66,7 @@ def names_in(path: Path) -> set[str]:
     return attributes | {node.id for node in nodes if isinstance(node, ast.Name)}
 
 
-@pytest.mark.parametrize("module", jaxsh.__all__)
+@pytest.mark.parametrize("module", faces.PACKAGES)
 def test_every_public_function_is_tried_on_a_mesh_of_devices(module):
     package = importlib.import_module(f"jaxsh.{module}")
     public = {

@@ -9,13 +9,12 @@ from collections.abc import Iterator
 from typing import Any
 
 import equinox as eqx
+import faces
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 import valid_calls
-
-import jaxsh
 
 
 class Other(eqx.Module):
@@ -120,7 +119,7 @@ def refusal(call, arguments, name: str, *, traced: bool = True) -> str | None:
     return "taken"
 
 
-MODULES = pytest.mark.parametrize("module", jaxsh.__all__)
+MODULES = pytest.mark.parametrize("module", faces.PACKAGES)
 
 
 @MODULES

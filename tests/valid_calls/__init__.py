@@ -2,12 +2,25 @@
 
 import functools
 
-from . import adaptive, geometry, harmonics, imaging, inverse, midrange, plot, sky, sphere, transfer
+from . import (
+    adaptive,
+    check,
+    geometry,
+    harmonics,
+    imaging,
+    inverse,
+    midrange,
+    plot,
+    sky,
+    sphere,
+    transfer,
+)
 from .shared import Call, K
 
 __all__ = ["MADE", "K", "table"]
 
 _MODULES = {
+    "_check": check,
     "adaptive": adaptive,
     "geometry": geometry,
     "harmonics": harmonics,
@@ -29,6 +42,7 @@ def table(module: str) -> dict[str, Call]:
 
 # Classes that functions make: not for a user to make by hand.
 MADE = {
+    "_check": {"Verdict"},
     "adaptive": {"AbstractMethod", "AdaptiveResult", "StagedTransfer", "Tiling"},
     "inverse": {"Confidence", "Recovered", "Rectangle", "SkyLight", "Statistics"},
     "geometry": {"BaseColor", "Hit", "Mesh", "RayScene", "RayTree", "Topology", "Trace"},

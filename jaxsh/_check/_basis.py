@@ -1,0 +1,184 @@
+"""A basis, given as a function: its whole matrix over ours, and what that is."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from ..harmonics import degrees
+from ._decide import Case, cases, decide
+from ._given import MOST, Light, Reading
+from ._known import judge
+from ._matching import constants, described, match
+from ._placements import grid, values
+from ._space import Space, space
+from ._verdict import Verdict
+from ._words import factor, facts, percent
+
+# Constants written with three digits are as far off.
+_TOLERANCE = 4e-3
+# Up to this degree functions are looked at one by one.
+_MATCHED = 4
+
+
+class Seen(NamedTuple):
+    """A basis over ours: b_i = Σ_j matrix_ij y_j, and what is left of each function, relatively."""
+
+    matrix: Float[np.ndarray, "k k"]
+    beyond: Float[np.ndarray, " k"]
+    notes: tuple[str, ...]
+
+
+def check_basis(function: Callable) -> Verdict:
+    """The verdict on a basis."""
+    seen = _look(function)
+    matrix, degree = seen.matrix, math.isqrt(len(seen.matrix)) - 1
+    table = space(degree, degree, basis=True)
+    found = [_as_case(matrix, table)]
+    decision = decide(found, table)
+    tests, whole = _tests(seen)
+    if decision.best.error <= _TOLERANCE and whole:
+        verdict = judge(found, decision, table, strength=True, basis=True)
+        return replace(verdict, notes=(*seen.notes, *tests, *verdict.notes))
+    return _faulty(seen, found[0], table, tests)
+
+
+def _as_case(matrix: np.ndarray, table: Space) -> Case:
+    """The basis as coefficients of K lights, each of one of our functions."""
+    reading = Reading("coefficients-last", matrix.T, one_channel=True)
+    return cases([reading], {len(matrix): [Light(np.eye(len(matrix)))]}, table)[0]
+
+
+def _look(function: Callable) -> Seen:
+    notes = []
+    first = _called(function, grid(0)[0], notes)
+    count = first.shape[1]
+    if count == 0 or math.isqrt(count) ** 2 != count:
+        raise ValueError(
+            "expected the basis to give (..., K) values with K = (degree + 1)² = 1, 4, 9, 16, …, "
+            f"got {count} for a direction"
+        )
+    degree = math.isqrt(count) - 1
+    if degree > MOST:
+        raise ValueError(f"expected a basis of degree {MOST} or less, got degree {degree}")
+    directions, weights = grid(degree + 4)
+    basis = _called(function, directions, [])
+    if not np.isfinite(basis).all():
+        raise ValueError("expected finite values of the basis, got NaN or infinite ones")
+    at_axes = np.concatenate([np.eye(3), -np.eye(3)])
+    with np.errstate(all="ignore"):
+        if not np.isfinite(_called(function, at_axes, [])).all():
+            notes.append("it gives NaN or infinite values in the direction of an axis")
+    matrix = (basis * weights[:, None]).T @ values(directions, degree)
+    whole = weights @ basis**2
+    inside = np.sum(matrix**2, axis=1)
+    beyond = np.sqrt(np.maximum(1 - inside / np.maximum(whole, np.finfo(float).tiny), 0))
+    matrix[np.abs(matrix) < 1e-9 * np.abs(matrix).max()] = 0.0
+    return Seen(matrix, np.where(beyond < 1e-6, 0.0, beyond), tuple(notes))
+
+
+def _called(function: Callable, directions: np.ndarray, notes: list[str]) -> np.ndarray:
+    """Values (N, K), whatever way the function takes directions and gives values."""
+    count = len(directions)
+    try:
+        result = np.asarray(function(directions), np.float64)
+        good = result.ndim == 2 and count in result.shape
+    except (TypeError, ValueError, IndexError):
+        good, result = False, directions
+    if not good:
+        result = np.stack([np.asarray(function(one), np.float64).ravel() for one in directions])
+    elif result.shape[0] != count:
+        notes.append("its values come as (K, N); (N, K) is expected")
+        result = result.T
+    return result
+
+
+def _tests(seen: Seen) -> tuple[list[str], bool]:
+    """Orthonormality and invariance under rotation, in words, and whether the space is whole."""
+    matrix, notes = seen.matrix, []
+    sizes = np.linalg.norm(matrix, axis=1)
+    unit = matrix / np.maximum(sizes, np.finfo(float).tiny)[:, None]
+    gram = unit @ unit.T - np.eye(len(unit))
+    far = np.unravel_index(int(np.abs(gram).argmax()), gram.shape)
+    if np.abs(gram[far]) > 0.01 and sizes.min() > 0:
+        first, second = sorted(map(int, far))
+        notes.append(
+            f"not orthogonal: functions {first} and {second} overlap by {gram[first, second]:.2g}"
+        )
+    elif np.ptp(sizes) > 0.01 * sizes.max():
+        notes.append(
+            f"orthogonal, not orthonormal: norms from {factor(sizes.min())} to "
+            f"{factor(sizes.max())}"
+        )
+    singular = np.linalg.svd(unit, compute_uv=False)
+    whole = bool(singular[-1] > 1e-3 and seen.beyond.max() < 0.02)
+    if not whole:
+        degree = math.isqrt(len(matrix)) - 1
+        out = np.flatnonzero(seen.beyond >= 0.02)
+        why = "its functions depend on each other"
+        if len(out):
+            number = int(out[seen.beyond[out].argmax()])
+            why = (
+                f"function {number} is no polynomial of degree {degree}: "
+                f"{percent(float(seen.beyond[number]))} of it is beyond"
+            )
+        notes.append(f"not a rotation-invariant space: {why}")
+    return notes, whole
+
+
+def _faulty(seen: Seen, case: Case, table: Space, tests: list[str]) -> Verdict:
+    """Name the convention with the most functions in common, and what the others are."""
+    light = np.eye(len(seen.matrix))
+    if table.degree > _MATCHED:  # what breaks a rule does so in the first degrees
+        count = (_MATCHED + 1) ** 2
+        low, table = seen.matrix[:count, :count], space(_MATCHED, _MATCHED, basis=True)
+        return _faulty(
+            seen._replace(matrix=low),
+            _as_case(low, table),
+            table,
+            [*tests, f"beyond degree {_MATCHED} functions were not looked at one by one"],
+        )
+    matched = match(seen.matrix.T, light, table, _TOLERANCE)
+    convention = table.convention(matched.at, "coefficients-last")
+    said = facts(convention, basis=True, gray=True)
+    notes = (*seen.notes, *tests)
+    right = int(matched.right.sum())
+    if 2 * right <= len(matched.right):
+        turned = _turned_otherwise(seen.matrix)
+        return Verdict(
+            decided=False,
+            summary=turned or "no known convention: most of its functions are in none",
+            faults=(),
+            notes=notes,
+        )
+    faults = described(
+        list(matched.faults), constants(convention.normalization, table.degree), table.degree
+    )
+    scale = 1.0 if abs(matched.scale - 1) <= _TOLERANCE else matched.scale
+    return Verdict(
+        decided=False,
+        summary=f"{', '.join(said.values())}, but for {len(matched.right) - right} of "
+        f"{len(matched.right)} functions",
+        found=convention,
+        scale=scale,
+        residual=float(case.fits.error[matched.at]),
+        faults=tuple(faults),
+        notes=notes,
+    )
+
+
+def _turned_otherwise(matrix: Float[np.ndarray, "k k"]) -> str:
+    """Says of a basis that is orthonormal in each degree that its axes lie askew."""
+    l = degrees(math.isqrt(len(matrix)) - 1)
+    if len(matrix) < 4 or np.abs(matrix[l[:, None] != l]).max() > 0.01 * np.abs(matrix).max():
+        return ""
+    gram = matrix @ matrix.T
+    if np.abs(gram - gram[0, 0] * np.eye(len(gram))).max() > 0.01 * gram[0, 0]:
+        return ""
+    return (
+        "orthonormal and invariant under rotation, but mixed within its degrees: in axes turned by "
+        "no quarter turns, or a basis of its own"
+    )

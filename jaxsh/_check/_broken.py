@@ -1,0 +1,154 @@
+"""Coefficients of a known light that follow no convention: what they do follow."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from ..harmonics import degrees
+from ._decide import Case, Choice, Decision, near_one
+from ._known import convention_of, judge, residuals
+from ._matching import Match, constants, described, match
+from ._search import numbers
+from ._space import Space, space
+from ._turn import look_for_turn
+from ._verdict import Verdict
+from ._words import factor, facts, percent
+
+# Single coefficients are looked at up to this degree, with the first tolerance that says something.
+_MATCHED = 3
+_TOLERANCES = 4e-3, 0.02, 0.06
+_CHANCE = 1e-3
+# What is no further off may be noise, and is further than so few coefficients allow.
+_NEAR = 0.35
+# Named conventions are as good as the best within this factor.
+_ALIKE = 1.5
+# A turn by any angle is believed where it leaves no more than this of the error.
+_MUCH_BETTER = 0.3
+
+
+def explain(found: list[Case], decision: Decision, table: Space, *, strength: bool) -> Verdict:
+    """The verdict where no combination fits."""
+    best = decision.best
+    notes = [f"the nearest convention is {percent(best.error)} off"]
+    broken = _broken(found, table)
+    if broken is not None:
+        case, matched, small = broken
+        layout = case.reading.layout
+        convention = small.convention(matched.at, layout)
+        said = facts(convention, gray=case.reading.hides_layout)
+        wrong = len(matched.faults)
+        faults = described(
+            list(matched.faults), constants(convention.normalization, small.degree), small.degree
+        )
+        faults += [words for words in (case.reading.said, case.light.said) if words]
+        return Verdict(
+            decided=False,
+            summary=f"{', '.join(said.values())}, but for {wrong} of {len(matched.right)} "
+            "coefficients",
+            found=convention,
+            scale=1.0 if abs(matched.scale - 1) < 0.02 else matched.scale,
+            residual=best.error,
+            residuals=residuals(found, table),
+            faults=tuple(faults),
+            notes=tuple(notes),
+        )
+    turn = look_for_turn(found, table, not strength)
+    if turn is not None and turn.decision.best.error < _MUCH_BETTER * best.error:
+        verdict = judge(found, turn.decision, table, strength=strength)
+        angle = math.degrees(turn.angle)
+        return replace(
+            verdict,
+            decided=False,
+            faults=(
+                f"turned by {angle:.1f}° about z, from x towards y, beside what was given",
+                *verdict.faults,
+            ),
+            conversion=f"harmonics.rotate_z({verdict.conversion}, {-turn.angle:.4f})",
+        )
+    if best.error <= _NEAR:
+        return _by_chance(best, decision, found, table)
+    powers = _powers(found)
+    if powers:
+        notes.append(powers)
+    return Verdict(
+        decided=False,
+        summary="no convention fits: it is not this light, or has more than one fault",
+        residuals=residuals(found, table),
+        notes=tuple(notes),
+        open=(
+            "is it this light? If so, the basis that made the coefficients, given as a function, "
+            "shows each fault",
+        ),
+    )
+
+
+def _by_chance(best: Choice, decision: Decision, found: list[Case], table: Space) -> Verdict:
+    """The verdict where a fit is good enough for noise, and not good enough to be no chance."""
+    errors = residuals(found, table)
+    convention = convention_of(best, table)
+    near = tuple(name for name, error in errors.items() if error <= _ALIKE * best.error)
+    said = ", ".join(facts(convention, gray=best.case.reading.hides_layout).values())
+    return Verdict(
+        decided=False,
+        summary=f"{said}, or by chance",
+        agree=near,
+        found=convention,
+        scale=1.0 if near_one(best.scale, best.error) else best.scale,
+        residual=best.error,
+        residuals=errors,
+        open=(
+            f"with so few coefficients something fits to {percent(best.error)} by chance; "
+            f"within {percent(decision.limit)} of the light, or up to a higher degree, they tell",
+        ),
+    )
+
+
+def _broken(found: list[Case], table: Space) -> tuple[Case, Match, Space] | None:
+    """The case with the most coefficients right, where so many are by no chance."""
+    degree = min(table.degree, _MATCHED)
+    whole = math.isqrt(found[0].reading.channels.shape[1]) - 1
+    small = space(degree, whole)
+    count = (degree + 1) ** 2
+    plain = [case for case in found if not case.light.said and not case.reading.said] or found
+    for tolerance in _TOLERANCES:
+        best = None
+        for case in plain:
+            light = case.light.coefficients[:, :count]
+            matched = match(case.reading.channels, light, small, tolerance)
+            if best is None or matched.right.sum() > best[1].right.sum():
+                best = case, matched
+        assert best is not None
+        right = int(best[1].right.sum())
+        each = numbers(best[0].light.coefficients) / best[0].light.coefficients.shape[1]
+        chance = math.log(small.maps * len(plain) * math.comb(count, right)) + each * (
+            right - 1
+        ) * math.log(tolerance)
+        if right < count and 3 * right >= 2 * count and chance < math.log(_CHANCE):
+            return best[0], best[1], small
+    return None
+
+
+def _powers(found: list[Case]) -> str:
+    """Read the power of each degree, which no turn changes."""
+    for case in found:
+        if case.light.said or case.reading.said:
+            continue
+        given, light = _by_degree(case.reading.channels), _by_degree(case.light.coefficients)
+        if len(given) < 3 or light.min() <= 0:
+            continue
+        ratio = given / light
+        if np.ptp(ratio) < 0.05 * ratio.max():
+            return (
+                "the power of each degree is that of the light: its directions are turned, by no "
+                "quarter turns"
+            )
+        said = ", ".join(factor(float(one)) for one in ratio / ratio[0])
+        return f"relative to the light its degrees have the sizes {said}"
+    return ""
+
+
+def _by_degree(channels: Float[np.ndarray, "c k"]) -> Float[np.ndarray, " bands"]:
+    l = degrees(math.isqrt(channels.shape[1]) - 1)
+    return np.sqrt(np.bincount(l, weights=np.sum(channels**2, axis=0)))
