@@ -68,7 +68,7 @@ def dering(
     >>> diffuse.shape, strength.shape, by_exponent.shape
     ((3, 25), (), (2,))
     >>> [round(float(s), 2) for s in (strength, *by_exponent)]
-    [0.28, 0.71, 0.99]
+    [0.5, 0.86, 0.99]
     """
     coefficients = as_float(coefficients, "coefficients")
     degree = check_coefficients("coefficients", coefficients)
@@ -248,7 +248,7 @@ def _refine(
         best = jnp.argmin(samples, axis=-1)
         return nearby[chosen, best], samples[chosen, best]
 
-    scales = jnp.asarray([reach, reach / 4, reach / 16], dtype)
+    scales = jnp.asarray([reach, reach / 4, reach / 16, reach / 64], dtype)
     directions, values = jax.lax.scan(closer, directions, scales)
     return directions, values[-1]
 

@@ -26,8 +26,9 @@ def window(
     - `"zonal-sinc"`: the same, but on m = 0 alone (Habel et al. 2008, eq. 5), for an edge along
       the horizon;
     - `"positive"`: of all windows whose kernel Σ (2l+1)/4π w_l P_l is nowhere negative, the nearest
-      to none, min Σ (2l+1) (1 - w_l)². Projected from any light without negative values, what is
-      under it has none either. The others promise nothing, or more blur.
+      to none, min Σ (2l+1)/l² (1 - w_l)²: weights between those of a bright spot and those of what
+      a diffuse surface sees. Any light without negative values has none under it either, which
+      the others do not promise.
 
     The stronger the window, the less ringing and the more blur: `dering` finds the least that a
     given light needs, and its docstring says what each costs. Raises `ValueError` for another
@@ -132,28 +133,27 @@ def softening(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array,
 def _positive(degree: int) -> Float[np.ndarray, " bands"]:
     """The window `"positive"`, by band.
 
-    With u_l = √(2l+1) w_l it is the point nearest to (√(2l+1)) where Σ u_l √(2l+1) P_l(z) >= 0 at
-    all z and u_0 = 1: least distance programming, which is non-negative least squares in disguise
-    (Lawson & Hanson 1974, ch. 23).
+    With a_l = √(2l+1)/l and u_l = a_l w_l it is the point nearest to a where the kernel
+    1 + Σ (2l+1)/a_l P_l(z) u_l >= 0 at all z: least distance programming, which is non-negative
+    least squares in disguise (Lawson & Hanson 1974, ch. 23).
     """
     if degree == 0:
         return np.ones(1)
     from scipy.optimize import nnls
 
-    scale = np.sqrt(2 * np.arange(degree + 1) + 1.0)
+    l = np.arange(1, degree + 1)
+    none = np.sqrt(2 * l + 1.0) / l
 
     def kernels(count: int) -> Float[np.ndarray, "z bands"]:
         z = np.cos(np.linspace(0, np.pi, count * (degree + 1)))
-        return np.polynomial.legendre.legvander(z, degree) * scale
+        return np.polynomial.legendre.legvander(z, degree)[:, 1:] * ((2 * l + 1) / none)
 
-    # y = u - scale, but for its first, which is 0: the shortest y with G y >= -G scale.
+    # The shortest y = u - a with kernel y >= -(1 + kernel a).
     kernel = kernels(64)
-    system = np.vstack([kernel[:, 1:].T, -(kernel @ scale)])
+    system = np.vstack([kernel.T, -(1 + kernel @ none)])
     aim = np.eye(degree + 1)[-1]
     residual = system @ nnls(system, aim, maxiter=100 * degree)[0] - aim
-    u = scale + np.append(0, -residual[:-1] / residual[-1])
+    u = none - residual[:-1] / residual[-1]
     # Between the points it dips below zero, ever so little beside its mean, which is 1.
-    dip = max(0.0, -float((kernels(512) @ u).min()))
-    window = u / scale / (1 + dip)
-    window[0] = 1
-    return window
+    dip = max(0.0, -1 - float((kernels(512) @ u).min()))
+    return np.append(1, u / none / (1 + dip))
