@@ -1,4 +1,4 @@
-"""What coefficients of another package mean: a convention as a few facts, and what follows."""
+"""Conventions of coefficients: a few facts each, and what follows from them."""
 
 import dataclasses
 import math
