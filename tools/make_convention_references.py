@@ -12,6 +12,9 @@ package's own layout, directions in its own axes, and what its own function make
 with the package's version. jaxsh takes no part in it. A C++ compiler and Node.js are needed.
 """
 
+# The packages live in an environment of their own.
+# pyright: reportMissingImports=false
+
 import argparse
 import json
 import runpy
@@ -231,7 +234,7 @@ def of_node(folder: Path):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=Path, help="with node_modules and the clones")
     folder = parser.parse_args().folder.resolve()
     sources = [of_pyshtools(), of_e3nn(), of_sphericart(), of_scipy(), of_gsplat()]

@@ -97,6 +97,13 @@ class Convention:
             check_choice("order", self.order, ORDERS)
         _set(self, "degree", min(limits, default=None))
 
+    def __repr__(self):
+        """Only what differs from our own convention, as it would be written down."""
+        fields = {field.name: field.default for field in dataclasses.fields(self)}
+        said = {name: getattr(self, name) for name in fields}
+        own = {name: default for name, default in fields.items() if said[name] == default}
+        return f"Convention({', '.join(f'{n}={v!r}' for n, v in said.items() if n not in own)})"
+
 
 def places(convention: Convention, degree: int) -> Int[np.ndarray, " k"]:
     """Locate each of our coefficients among the package's K, before its layout."""

@@ -1,6 +1,7 @@
 """Conversion of coefficients between conventions."""
 
 import functools
+import itertools
 import math
 
 import jax
@@ -15,6 +16,9 @@ from ._convention import Convention, axes_matrix, places, scales
 from ._conventions import look_up
 from ._indexing import degrees, num_coefficients, orders
 from ._turns import axes_blocks
+
+# Up to this degree one product is faster than one for each band, in spite of the zeros.
+_DENSE = 8
 
 
 def convert(
@@ -66,18 +70,19 @@ def _convert(
 ) -> Float[Array, "..."]:
     functions = _unpack(array, source, degree)
     matrices = [matrix.astype(array.dtype) for matrix in _matrices(source, target, degree)]
-    if len(matrices) == 1:
+    if matrices[0].ndim == 1:
         functions = jnp.multiply(*align(functions, jnp.asarray(matrices[0])))
     else:
-        bands = [functions[..., l * l : (l + 1) ** 2] for l in range(degree + 1)]
+        ends = np.cumsum([0, *map(len, matrices)])
+        bands = [functions[..., a:b] for a, b in itertools.pairwise(ends)]
         turned = [matmul(band, matrix.T) for band, matrix in zip(bands, matrices, strict=True)]
-        functions = jnp.concatenate(turned, axis=-1)
+        functions = jnp.concatenate(turned, axis=-1) if len(turned) > 1 else turned[0]
     return _pack(functions, target, degree)
 
 
-@read_only_cache(maxsize=256)
+@read_only_cache(maxsize=32)
 def _matrices(source: Convention, target: Convention, degree: int) -> list[np.ndarray]:
-    """Combine all but order and layout: a matrix for each degree, or one row of factors.
+    """Combine all but order and layout: one row of factors, or matrices along the diagonal.
 
     In float64, so that all is rounded once.
     """
@@ -87,8 +92,14 @@ def _matrices(source: Convention, target: Convention, degree: int) -> list[np.nd
     if (turn == np.eye(3)).all():
         return [incoming * outgoing]
     bands = [slice(l * l, (l + 1) ** 2) for l in range(degree + 1)]
-    blocks = zip(bands, axes_blocks(tuple(map(tuple, turn.tolist())), degree), strict=True)
-    return [outgoing[band, None] * block * incoming[band] for band, block in blocks]
+    blocks = axes_blocks(tuple(map(tuple, turn.tolist())), degree)
+    if degree > _DENSE:
+        both = zip(bands, blocks, strict=True)
+        return [outgoing[band, None] * block * incoming[band] for band, block in both]
+    whole = np.zeros(2 * (len(incoming),))
+    for band, block in zip(bands, blocks, strict=True):
+        whole[band, band] = block
+    return [outgoing[:, None] * whole * incoming]
 
 
 def _quantity_factors(

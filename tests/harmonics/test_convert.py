@@ -66,7 +66,7 @@ def test_axes_of_a_high_degree(rng):
 
 def test_up_is_a_rotation(rng):
     """Axes with y up: (x, y, z) → (x, -z, y), as `read_mesh(path, up="y")` turns meshes."""
-    light = rng.normal(size=(3, 25))
+    light = rng.normal(size=(3, 100))  # of a degree whose bands are turned one by one
     rotation = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     found = harmonics.convert(light, Convention(axes="y-up"), "jaxsh")
     np.testing.assert_allclose(found, harmonics.rotate(light, rotation), rtol=0, atol=1e-14)
@@ -200,10 +200,17 @@ def test_wrong_facts(facts, said):
         Convention(**facts)
 
 
+def test_a_convention_says_what_is_not_ours():
+    said = repr(harmonics.conventions()["unreal"])
+    assert said.startswith("Convention(phase='condon-shortley', axes=('+x', '-y', '+z'), about=")
+    for convention in harmonics.conventions().values():
+        assert eval(repr(convention), {"Convention": Convention}) == convention
+
+
 def test_facts_can_be_changed():
     conventions = harmonics.conventions()
     changed = dataclasses.replace(conventions["filament"], layout="by-coefficient", degree=5)
     assert changed.degree == 2  # the polynomials end there
     assert len({*conventions.values(), changed}) > 15  # can be a static argument of `jit`
     with pytest.raises(TypeError):
-        conventions["mine"] = changed
+        conventions["mine"] = changed  # pyright: ignore[reportIndexIssue]
