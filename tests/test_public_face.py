@@ -39,8 +39,12 @@ REASONS = {
     "imaging": {
         "backdrop": ONE,
         "read_environment": NO_ARRAYS,
+        "read_light": NO_ARRAYS,
+        "read_splats": NO_ARRAYS,
         "studio": NO_ARRAYS,
         "write_image": NO_ARRAYS,
+        "write_light": HOST,
+        "write_splats": HOST,
     },
     "midrange": {"grid_around": ONE, "place_samples": HOST, "update_samples": HOST},
     "plot": dict.fromkeys(["bands", "light", "lobes"], HOST),

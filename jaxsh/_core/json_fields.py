@@ -68,6 +68,19 @@ def numbers(
     return value
 
 
+def number(fields: Fields, key: str, owner: str, default: float) -> float:
+    """Take a finite number."""
+    value = fields.get(key)
+    if value is None:
+        return default
+    try:
+        return numbers({key: [value]}, key, owner, 1, None)[0]
+    except ValueError:
+        raise ValueError(
+            f"{owner} should have a finite number as {key!r}, got {shown(value)}"
+        ) from None
+
+
 def indices(fields: Fields, key: str, owner: str) -> list[int]:
     """Take a list of whole numbers >= 0; empty where there is none."""
     value = listed(fields, key, owner)

@@ -37,7 +37,7 @@ class Header(NamedTuple):
     order: str  # "<" or ">" for binary, "" for text
     comments: list[str]
     ignored: int  # lines that say nothing known
-    body: bytes
+    body: memoryview  # of the file, which may be large
 
 
 class Lists(NamedTuple):
@@ -94,14 +94,14 @@ def read_header(data: bytes) -> Header:
                 ignored += 1
     if order is None:
         raise ValueError("its header names no format")
-    return Header(elements, order, comments, ignored, data[at:])
+    return Header(elements, order, comments, ignored, memoryview(data)[at:])
 
 
 def read_elements(header: Header, found: list[str]) -> dict[str, Columns]:
     """Read all elements; of two with one name or two such properties the first stays."""
     read: dict[str, Columns] = {}
     if header.order == "":
-        words = Words(plain_text(header.body))
+        words = Words(plain_text(bytes(header.body)))
         announced = sum(element.rows for element in header.elements if element.properties)
         if len(words.first) < announced:
             raise ValueError(f"it announces {announced} lines of data, but has {len(words.first)}")

@@ -9,12 +9,15 @@ from ._backdrop import backdrop, look_up
 from ._camera import Camera
 from ._display import auto_exposure, psnr, srgb_decode, srgb_encode, tone_map
 from ._environment import read_environment, studio
+from ._light import read_light, write_light
 from ._raster import Raster, interpolate, rasterize
+from ._splats import Splats, read_splats, write_splats
 from ._write import write_image
 
 __all__ = [
     "Camera",
     "Raster",
+    "Splats",
     "auto_exposure",
     "backdrop",
     "interpolate",
@@ -22,9 +25,13 @@ __all__ = [
     "psnr",
     "rasterize",
     "read_environment",
+    "read_light",
+    "read_splats",
     "srgb_decode",
     "srgb_encode",
     "studio",
     "tone_map",
     "write_image",
+    "write_light",
+    "write_splats",
 ]

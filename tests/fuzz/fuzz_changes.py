@@ -28,6 +28,7 @@ JSON_KEYS = [
     "skin", "children", "matrix", "scale", "rotation", "translation", "extensions", "min", "max",
     "extras", "uri", "camera", "mesh", "NORMAL", "COLOR_0", "TEXCOORD_0", "JOINTS_0", "WEIGHTS_0",
     "_A", "material", "count", "extensionsRequired", "extensionsUsed", "scene", "animations",
+    "sh", "intensity", "light", "lights", "name", "irradianceCoefficients", "object", "type",
 ]  # fmt: skip
 _EXTENSIONS = [
     "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mesh_quantization",
@@ -89,7 +90,7 @@ def _edit_tree(tree, rng: Random) -> None:
 def _edit_json(data: bytes, rng: Random, kind: str) -> bytes:
     """Change the JSON of a GLB, and give the container the lengths that it then has."""
     try:
-        if kind == "gltf":
+        if not kind.endswith("glb"):
             tree, rest = json.loads(data), b""
         else:
             length = int.from_bytes(data[12:16], "little")
@@ -101,7 +102,7 @@ def _edit_json(data: bytes, rng: Random, kind: str) -> bytes:
         return data
     if rng.random() < 0.01:  # deeper than any parser that calls itself likes
         text = text[:-1] + b', "x": ' + b"[" * 100000 + b"]" * 100000 + b"}"
-    if kind == "gltf":
+    if not kind.endswith("glb"):
         return text
     text += b" " * (-len(text) % 4)
     head = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON")
@@ -226,6 +227,13 @@ _CHANGES = {
     "tif": [*OF_BYTES, put_number, put_number],
     "npy": [*OF_BYTES, *[_edit_npy] * 8],
     "npz": [*OF_BYTES, *[_edit_archive] * 12],
+    "light.json": [*OF_BYTES, *OF_TEXT, *[_edit_json] * 16],
+    "light.txt": _MIXED + OF_TEXT,
+    "light.gltf": [*OF_BYTES, *OF_TEXT, *[_edit_json] * 16],
+    "light.glb": [*OF_BYTES, *[_edit_json] * 16, *[_edit_chunks] * 2],
+    "light.npz": [*OF_BYTES, *[_edit_archive] * 12],
+    "light.npy": [*OF_BYTES, *[_edit_npy] * 8],
+    "splats.ply": _MIXED + OF_TEXT,
 }
 
 

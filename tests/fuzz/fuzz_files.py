@@ -5,6 +5,7 @@ import struct
 import zlib
 from pathlib import Path
 
+import fuzz_lights
 import fuzz_meshes
 import fuzz_pictures
 import numpy as np
@@ -59,8 +60,9 @@ def _transfer() -> list[bytes]:
     return files
 
 
-_MAKERS = fuzz_meshes.MAKERS | fuzz_pictures.MAKERS | {"npz": _transfer}
+_MAKERS = fuzz_meshes.MAKERS | fuzz_pictures.MAKERS | {"npz": _transfer} | fuzz_lights.MAKERS
 MESHES, PICTURES, FORMATS = tuple(fuzz_meshes.MAKERS), tuple(fuzz_pictures.MAKERS), tuple(_MAKERS)
+LIGHTS = tuple(fuzz_lights.MAKERS)
 
 
 @functools.cache

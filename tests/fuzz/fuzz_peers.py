@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from fuzz_files import MESHES, PICTURES
+from fuzz_files import LIGHTS, MESHES, PICTURES
 from fuzz_pictures import CODES
 
 Summary = np.ndarray
@@ -37,6 +37,9 @@ def summary(kind: str, result) -> Summary | None:
         return of_triangles(vertices[np.asarray(result.faces)])
     if kind in PICTURES:
         return np.asarray(result, np.float64).mean(axis=(0, 1))
+    if kind in LIGHTS:
+        light = np.asarray(result.coefficients if kind == "splats.ply" else result, np.float64)
+        return light.reshape(-1, light.shape[-1]).mean(axis=0)
     names = ("coefficients", "positions", "normals", "neighbors")
     return np.array([np.asarray(getattr(result, name), np.float64).sum() for name in names])
 
@@ -128,6 +131,7 @@ PEERS: dict[str, dict[str, Callable[[Path], Summary | None]]] = {
     "mtl": {},
     **{kind: {"Pillow": _by_pillow} for kind in CODES},
     "npz": {"NumPy": _by_numpy_zip},
+    **{kind: {} for kind in LIGHTS},
 }
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from fuzz_files import MESHES, PICTURES
+from fuzz_files import LIGHTS, MESHES, PICTURES
 from fuzz_pictures import CODES
 
 from jaxsh import geometry, imaging, transfer
@@ -64,6 +64,10 @@ def read(kind: str, path: Path):
             _check_words(str(error), path)
             warnings.warn(f"{path}: repaired", UserWarning, stacklevel=2)
         return imaging.read_environment(path, encoding=encoding, repair=True)
+    if kind == "splats.ply":
+        return imaging.read_splats(path)
+    if kind in LIGHTS:
+        return imaging.read_light(path, convention="jaxsh" if kind == "light.npy" else None)
     return transfer.load(path)
 
 
@@ -137,6 +141,9 @@ def _check_result(kind: str, result) -> None:
     elif kind in PICTURES:
         pixels = np.asarray(result)
         ok = bool(np.isfinite(pixels).all()) and pixels.min() >= 0 and pixels.max() > 0
+    elif kind in LIGHTS:
+        light = np.asarray(result.coefficients if kind == "splats.ply" else result)
+        ok = light.ndim > 1 and light.shape[-2] == 3 and bool(np.isfinite(light).all())
     else:
         neighbors = np.asarray(result.neighbors)
         ok = neighbors.size == 0 or 0 <= neighbors.min() <= neighbors.max() < len(result.positions)

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fuzz_changes import change
-from fuzz_files import FORMATS, MESHES, PICTURES, put_beside, seeds
+from fuzz_files import FORMATS, LIGHTS, MESHES, PICTURES, put_beside, seeds
+from fuzz_lights import light
 from fuzz_peers import summary
 from fuzz_pictures import CODES, picture
 from fuzz_readers import check, without_compiling
@@ -32,9 +33,9 @@ def needs_packages(kind: str) -> None:
         pytest.importorskip("OpenImageIO")
 
 
-def read(path: Path):
+def read(kind: str, path: Path):
     """Read a file that is valid, without a warning."""
-    result, warned = check(path.suffix[1:], path)
+    result, warned = check(kind, path)
     assert result is not None, path
     assert not warned, path
     return result
@@ -52,7 +53,7 @@ def test_the_files_to_start_from_are_read_right(tmp_path, kind):
             factor = check(kind, path).result.materials[0].factor
             np.testing.assert_allclose(factor, [[1, 0.5, 0, 1], [0.5, 0.5, 0.5, 0.75]][i])
             continue
-        result = read(path)
+        result = read(kind, path)
         if kind in PICTURES:
             expected = picture()
             for gray, channel in ((("pfm", 2), 1), (("npy", 3), 0)):
@@ -66,6 +67,9 @@ def test_the_files_to_start_from_are_read_right(tmp_path, kind):
             # Decoders of JPEG differ by a code here and there.
             off = 0.01 if kind == "jpg" else 1e-6
             np.testing.assert_allclose(result, expected, rtol=0, atol=off)
+        elif kind in LIGHTS:
+            for one in result.coefficients if kind == "splats.ply" else [result]:
+                np.testing.assert_allclose(one, light(), rtol=0, atol=1e-14)
         elif kind in MESHES and (kind, i) not in OTHER_SHAPES:
             # A prism of height 3/4 over an L of area 1 and perimeter 5; one has its walls alone.
             caps = 0 if (kind, i) == ("ply", 4) else 2 * 1

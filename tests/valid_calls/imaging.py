@@ -1,5 +1,6 @@
 """Valid calls of `jaxsh.imaging`."""
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxsh import geometry, imaging
@@ -35,6 +36,14 @@ def calls():
             host=True,
             finite="fov_y margin",
         ),
+        "Splats": of(
+            i.Splats,
+            positions=floats(4, 3),
+            coefficients=floats(4, 3, 9),
+            opacities=floats(4),
+            scales=floats(4, 3),
+            rotations=floats(4, 4),
+        ),
         "auto_exposure": of(
             i.auto_exposure, image=image, mask=image[..., 0] > 0.5, percentile=90.0
         ),
@@ -64,11 +73,37 @@ def calls():
             free="path layer",
             slow=True,
         ),
+        "read_light": of(
+            i.read_light,
+            path="no such file.json",
+            convention="three.js",
+            up="y",
+            which="sky",
+            free="path which",
+            slow=True,
+        ),
+        "read_splats": of(i.read_splats, path="no such file.ply", up="y", slow=True),
         "srgb_decode": of(i.srgb_decode, signal=image),
         "srgb_encode": of(i.srgb_encode, linear=image),
         "studio": of(i.studio, height=8, width=16),
         "tone_map": of(i.tone_map, image=image, exposure=1.0, curve="reinhard", white=2.0),
         "write_image": of(
             i.write_image, path="/dev/null/no/a.exr", image=image, encoding=None, slow=True
+        ),
+        "write_light": of(
+            i.write_light,
+            path="/dev/null/no/a.json",
+            light=floats(3, 9),
+            convention="three.js",
+            up="y",
+            finite="light",
+            slow=True,
+        ),
+        "write_splats": of(
+            i.write_splats,
+            path="/dev/null/no/a.ply",
+            splats=i.Splats(jnp.zeros((4, 3)), jnp.zeros((4, 3, 9))),
+            up="y",
+            slow=True,
         ),
     }
