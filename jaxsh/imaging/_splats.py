@@ -4,8 +4,9 @@ import dataclasses
 import math
 import os
 import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import equinox as eqx
 import jax
@@ -29,8 +30,12 @@ _TURNS = {
 }
 
 
-def _floats(name: str, *, missing: bool = False):
-    return lambda value: None if missing and value is None else as_float(value, name)
+def _floats(name: str) -> Callable[[Any], Array]:
+    return lambda value: as_float(value, name)
+
+
+def _floats_or_none(name: str) -> Callable[[Any], Array | None]:
+    return lambda value: None if value is None else as_float(value, name)
 
 
 class Splats(eqx.Module):
@@ -64,13 +69,13 @@ class Splats(eqx.Module):
     positions: Float[Array, "n 3"] = eqx.field(converter=_floats("positions"))
     coefficients: Float[Array, "n 3 k"] = eqx.field(converter=_floats("coefficients"))
     opacities: Float[Array, " n"] | None = eqx.field(
-        default=None, converter=_floats("opacities", missing=True)
+        default=None, converter=_floats_or_none("opacities")
     )
     scales: Float[Array, "n s"] | None = eqx.field(
-        default=None, converter=_floats("scales", missing=True)
+        default=None, converter=_floats_or_none("scales")
     )
     rotations: Float[Array, "n 4"] | None = eqx.field(
-        default=None, converter=_floats("rotations", missing=True)
+        default=None, converter=_floats_or_none("rotations")
     )
 
     def __check_init__(self):

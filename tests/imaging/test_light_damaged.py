@@ -36,7 +36,7 @@ def gltf(scene: int = 0, **more) -> str:
         (
             "a.json",
             three(intensity="bright"),
-            "LightProbe 0 should have a finite number as 'intens",
+            "LightProbe 0 should have a finite number as 'in",
         ),
         ("a.json", three()[:-2], "its JSON is damaged: "),
         ("a.json", "{}", "it holds no LightProbe of three.js, which is an object with 'sh'"),

@@ -4,7 +4,7 @@ import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -71,7 +71,7 @@ def _convention(words: dict[str, str]) -> str | Convention | None:
     return name
 
 
-def _tuples(fact):
+def _tuples(fact: Any) -> Any:
     """Give tuples for JSON's lists."""
     return tuple(map(_tuples, fact)) if isinstance(fact, list) else fact
 
