@@ -60,7 +60,7 @@ REASONS = {
     },
     "sphere": dict.fromkeys(["cube_map", "fibonacci", "gauss_legendre", "lat_long"], NO_ARRAYS)
     | {"split_sun": HOST},
-    "transfer": {"bake": HOST, "load": NO_ARRAYS, "save": HOST},
+    "transfer": {"bake": HOST, "load": NO_ARRAYS, "save": HOST, "sun_visibility": HOST},
 }
 
 

@@ -10,6 +10,8 @@ from ._fixed_light import FixedLight, fixed_light
 from ._fixed_view import FixedView, fixed_view
 from ._material import Material
 from ._shade import reflected_direction, shade_diffuse, shade_glossy
+from ._sun import shade_sun
+from ._sun_visibility import SunVisibility, sun_visibility
 from ._transfer import (
     AbstractTransfer,
     QuantizedTransfer,
@@ -27,6 +29,7 @@ __all__ = [
     "Material",
     "QuantizedTransfer",
     "SampledTransfer",
+    "SunVisibility",
     "Transfer",
     "bake",
     "fixed_light",
@@ -38,5 +41,7 @@ __all__ = [
     "save",
     "shade_diffuse",
     "shade_glossy",
+    "shade_sun",
+    "sun_visibility",
     "unshadowed",
 ]

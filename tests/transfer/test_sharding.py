@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from sharding import ROWS, WHOLE, P, check_sharded
 
+from jaxsh.sphere import Suns
 from jaxsh.transfer import (
     Material,
     QuantizedTransfer,
+    SunVisibility,
     Transfer,
     fixed_light,
     fixed_view,
@@ -17,6 +19,7 @@ from jaxsh.transfer import (
     sample,
     shade_diffuse,
     shade_glossy,
+    shade_sun,
     unshadowed,
 )
 
@@ -191,3 +194,55 @@ def test_reflected_directions(frame):
     _, made, eye, _ = frame
     arguments = eye, made.positions, made.normals
     check_sharded(reflected_direction, arguments, (WHOLE, ROWS, ROWS), ROWS)
+
+
+@pytest.fixture
+def sunny(frame, rng):
+    """Two suns, and what V vertices see of them."""
+    sun = Suns(np.array([[0.3, 0.4, 0.8], [-0.5, 0, 0.6]]), np.array([0.1, 0.2]), np.ones((2, 3)))
+    sun = jax.tree.map(lambda array: array.astype(np.float32), sun)
+    seen, draw = rng.random((V, 2, 4)) < 0.5, rng.integers(2**32, size=V, dtype=np.uint32)
+    visibility = SunVisibility(jnp.asarray(seen), jnp.asarray(draw), sun.direction, sun.solid_angle)
+    return sun, visibility, specs_of(visibility, (ROWS, ROWS, WHOLE, WHOLE))
+
+
+def test_suns(frame, sunny):
+    sun, visibility, specs = sunny
+    _, made, _, material = frame
+    arguments = sun, made, visibility, material.diffuse
+    check_sharded(shade_sun, arguments, (WHOLE, ROWS, specs, ROWS), ROWS)
+
+
+@pytest.mark.slow
+def test_suns_on_what_is_glossy_and_their_gradient(frame, sunny):
+    sun, visibility, specs = sunny
+    _, made, eye, material = frame
+
+    def shade(sun, made, visibility, material, eye):
+        return shade_sun(sun, made, visibility, material=material, eye=eye)
+
+    arguments = sun, made, visibility, material, eye
+    spread = WHOLE, ROWS, specs, ROWS, WHOLE
+    check_sharded(shade, arguments, spread, ROWS)
+    shape = jnp.asarray(sun.rays(8), np.float32)
+    check_sharded(
+        shade,
+        (Suns(sun.direction, sun.solid_angle, sun.radiance, shape), *arguments[1:]),
+        spread,
+        ROWS,
+    )
+
+    def slope(normals, *rest):
+        def loss(normals):
+            turned = Transfer(made.coefficients, made.positions, normals, made.neighbors)
+            return jnp.sum(shade(sun, turned, *rest) ** 2)
+
+        return jax.grad(loss)(normals)
+
+    check_sharded(
+        slope,
+        (made.normals, visibility, material, eye),
+        (ROWS, specs, ROWS, WHOLE),
+        ROWS,
+        mapped=False,
+    )

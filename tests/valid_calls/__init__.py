@@ -49,5 +49,5 @@ MADE = {
     "imaging": {"Raster"},
     "midrange": {"Update", "Weights"},
     "sky": {"Axis", "FitError", "PreethamConstants", "SkyFit", "SkyWarning", "Solution"},
-    "transfer": {"AbstractTransfer", "QuantizedTransfer", "SampledTransfer"},
+    "transfer": {"AbstractTransfer", "QuantizedTransfer", "SampledTransfer", "SunVisibility"},
 }

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from jaxsh import transfer
+from jaxsh import sphere, transfer
 
 from .shared import K, V, eye, floats, knot, made, material, of
 
@@ -10,6 +10,7 @@ from .shared import K, V, eye, floats, knot, made, material, of
 def calls():
     t = transfer
     light, flags = floats(3, K), {"distant": True, "normalized": True}
+    suns = sphere.Suns(floats(2, 3), floats(2), floats(2, 3))
     return {
         "Material": of(
             t.Material,
@@ -87,6 +88,42 @@ def calls():
             material=material(),
             **flags,
             finite="light eye",
+        ),
+        "shade_sun": of(
+            t.shade_sun,
+            suns=suns,
+            surface=made(),
+            scene=None,
+            albedo=floats(V, 3),
+            material=None,
+            eye=None,
+            shadows=False,
+            **flags,
+            finite="albedo",
+        ),
+        "shade_sun.glossy": of(
+            t.shade_sun,
+            suns=suns,
+            surface=made(),
+            scene=None,
+            albedo=None,
+            material=material(),
+            eye=eye(),
+            shadows=False,
+            **flags,
+            finite="eye",
+        ),
+        "sun_visibility": of(
+            t.sun_visibility,
+            suns=suns,
+            surface=knot(),
+            scene=None,
+            rays=4,
+            ray_bias=1e-4,
+            offset=None,
+            seed=0,
+            finite="ray_bias",
+            slow=True,
         ),
         "unshadowed": of(
             t.unshadowed,

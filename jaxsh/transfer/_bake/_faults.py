@@ -42,7 +42,8 @@ def check_arguments(
             raise ValueError(f"expected {name} of the mesh in float32 or float64, got {dtype}")
     if len(vertices) == 0:
         raise ValueError("the mesh has no vertices")
-    if bad := int((~np.isfinite(vertices).all(axis=1)).sum()):
+    if not np.isfinite(vertices).all():
+        bad = int((~np.isfinite(vertices).all(axis=1)).sum())
         raise ValueError(f"the mesh has {bad} NaN or infinite vertices; make_mesh drops such")
     check_faces("the mesh", faces, len(vertices))
     check_size("directions", directions)

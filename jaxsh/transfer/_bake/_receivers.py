@@ -67,9 +67,12 @@ def unit_normals(mesh: Mesh) -> Float[np.ndarray, "v 3"]:
     """
     normals = np.asarray(mesh.normals)
     with np.errstate(invalid="ignore"):
-        # Very long or short ones would leave the range of numbers when squared.
-        normals = np.ldexp(normals, -np.frexp(np.abs(normals).max(axis=1, keepdims=True))[1])
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        # Very long or short ones would leave the range of numbers when squared. By columns, which
+        # takes NumPy a fraction of the time of reductions over three.
+        x, y, z = np.abs(normals.T)
+        largest = np.maximum(np.maximum(x, y), z)[:, None]
+        normals = np.ldexp(normals, -np.frexp(largest)[1])
+        length = _lengths(normals.T)[:, None]
     defined = np.isfinite(length) & (length > 0) & ~_cancelled(mesh)[:, None]
     return np.where(defined, normals / np.where(defined, length, 1), 0).astype(normals.dtype)
 

@@ -1,0 +1,99 @@
+"""Visibility of compact sources against the share of a disc that a wall leaves."""
+
+import numpy as np
+import pytest
+from bodies import by_hand, points, rectangle
+
+from jaxsh.geometry import JaxRayScene, knot, ray_scene
+from jaxsh.sphere import Suns
+from jaxsh.transfer import sun_visibility
+
+RADIUS = 0.1
+
+
+def sun(height, shape=None):
+    """A disc over +x, its middle `height` above the horizon."""
+    direction = [[np.cos(height), 0, np.sin(height)]]
+    return Suns(direction, [4 * np.pi * np.sin(RADIUS / 2) ** 2], [[1.0, 1.0, 1.0]], shape)
+
+
+def wall(elevation):
+    """A wide wall at x = 1 that hides what is below an elevation, seen from around the origin."""
+    return rectangle([1, -200, -1], [0, 400, 0], [0, 0, 1 + np.tan(elevation)])
+
+
+def floor(count, rng):
+    """Points close together, each with a pattern of its own."""
+    positions = 1e-4 * rng.normal(size=(count, 3)) * [0, 1, 0]
+    return points(positions, np.tile([0, 0, 1], (count, 1)))
+
+
+def in_groups():
+    """The disc as 64 vectors, four neighbors after four (Shirley & Chiu's map of a square)."""
+    u, v, i, j = np.meshgrid(*[np.arange(n) for n in (4, 4, 2, 2)], indexing="ij")
+    a, b = ((2 * (2 * u + i) + 1) / 8 - 1).ravel(), ((2 * (2 * v + j) + 1) / 8 - 1).ravel()
+    wide = abs(a) > abs(b)
+    radius = np.where(wide, a, b)
+    phi = np.where(wide, np.pi / 4 * b / a, np.pi / 2 - np.pi / 4 * a / b) + 0.3
+    height = radius**2 * 2 * np.sin(RADIUS / 2) ** 2
+    sine = np.sign(radius) * np.sqrt(height * (2 - height))
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), 1 - height], -1)[None]
+
+
+@pytest.mark.parametrize("share", [-0.9, -0.5, 0, 0.3, 0.8])
+@pytest.mark.parametrize("shaped", [False, True])
+def test_a_wall_leaves_its_share_of_the_disc(rng, share, shaped):
+    """The edge of a wide wall is a great circle: the part beyond it is nearly a flat segment's."""
+    elevation = 0.6
+    above = sun(elevation - share * RADIUS, in_groups() if shaped else None)
+    visibility = sun_visibility(above, floor(500, rng), ray_scene(wall(elevation)))
+    assert visibility.seen.shape == (500, 1, 16)
+    exact = (np.arccos(share) - share * np.sqrt(1 - share**2)) / np.pi
+    fraction = np.asarray(visibility.fraction[:, 0])
+    # 4 to 6 % at each point, and little bias over many.
+    assert np.sqrt(np.mean((fraction - exact) ** 2)) < 0.07
+    np.testing.assert_allclose(fraction.mean(), exact, rtol=0, atol=0.02)
+
+
+def test_one_position_has_one_pattern_and_a_seed_its_bits(rng):
+    mesh = knot(300)
+    twice = by_hand(
+        np.concatenate([mesh.vertices] * 2), mesh.faces, np.concatenate([mesh.normals] * 2)
+    )
+    light = sun(0.5)
+    scene = ray_scene(mesh)
+    visibility = sun_visibility(light, twice, scene, offset=1e-3)
+    for name in ("seen", "draw"):
+        halves = np.split(np.asarray(getattr(visibility, name)), 2)
+        np.testing.assert_array_equal(*halves)
+    assert len(np.unique(visibility.draw)) > 290
+    other = sun_visibility(light, twice, scene, offset=1e-3, seed=1)
+    assert (other.draw != visibility.draw).mean() > 0.9
+    fraction = np.asarray(visibility.fraction)
+    assert min((fraction == value).mean() for value in (0, 1)) > 0.1
+
+
+def test_no_ray_leaves_for_a_sun_below(rng):
+    class Counting:
+        rays = 0
+
+        def occluded(self, origins, directions, max_distance=np.inf):
+            self.rays += len(origins)
+            return np.zeros(len(origins), bool)
+
+        def closest_hit(self, origins, directions):
+            raise AssertionError
+
+    for height, rays in ((-0.2, 0), (0, (500, 1100)), (0.2, 16 * 100)):
+        scene = Counting()
+        visibility = sun_visibility(sun(height), floor(100, rng), scene, offset=1e-3)
+        least, most = rays if isinstance(rays, tuple) else (rays, rays)
+        assert least <= scene.rays <= most
+        assert int(visibility.seen.sum()) == scene.rays
+
+
+@pytest.mark.slow
+def test_rays_in_jax_see_the_same():
+    mesh, light = knot(300), sun(0.4)
+    one, other = (sun_visibility(light, mesh, s) for s in (ray_scene(mesh), JaxRayScene(mesh)))
+    assert (one.seen != other.seen).mean() < 1e-3
