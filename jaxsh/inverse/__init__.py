@@ -5,7 +5,9 @@ many places at once, so that it does not end in the wrong valley, and none that 
 stays silent.
 """
 
+from ._daylight import Daylight
 from ._fit_colors import fit_colors
+from ._fit_daylight import fit_daylight
 from ._fit_polygons import fit_polygons
 from ._fit_sky import SkyLight, fit_sky
 from ._rectangle import Rectangle, rectangle_of
@@ -13,11 +15,13 @@ from ._result import Confidence, Recovered, Statistics
 
 __all__ = [
     "Confidence",
+    "Daylight",
     "Recovered",
     "Rectangle",
     "SkyLight",
     "Statistics",
     "fit_colors",
+    "fit_daylight",
     "fit_polygons",
     "fit_sky",
     "rectangle_of",

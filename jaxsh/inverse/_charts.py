@@ -35,7 +35,7 @@ def from_hemisphere(directions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "
     return directions[:, :2] / np.maximum(radius, 1e-300) * np.arcsin(2 / math.pi * theta)
 
 
-def to_interval(p: Float[Array, ""], low: float, high: float) -> Float[Array, ""]:
+def to_interval(p: Float[Array, "*p"], low: float, high: float) -> Float[Array, "*p"]:
     """Maps p into [low, high]: its middle and half its length times sin p."""
     return (low + high) / 2 + (high - low) / 2 * jnp.sin(p)
 

@@ -4,7 +4,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_flag, check_number, check_size, check_type, is_concrete
+from .._core.checks import (
+    as_float,
+    check_flag,
+    check_number,
+    check_size,
+    check_type,
+    described,
+    is_concrete,
+)
 from ..transfer import Transfer
 from ..transfer._glossy_kernels import checked_albedo
 from ._result import Recovered
@@ -38,6 +46,17 @@ def check_solver(tolerance: float | None, max_steps: int, throw: bool) -> None:
         check_number("tolerance", tolerance, above=0.0)
     check_size("max_steps", max_steps)
     check_flag("throw", throw)
+
+
+def check_bounds(name: str, bounds: tuple[float, float]) -> tuple[float, float]:
+    """The bounds as Python numbers; raises unless they are 0 < low < high."""
+    check_type(name, bounds, tuple, list)
+    if len(bounds) != 2:
+        raise ValueError(f"{name} must be bounds (low, high), got {described(bounds)}")
+    low, high = (check_number(f"a bound of {name}", bound, above=0.0) for bound in bounds)
+    if not low < high:
+        raise ValueError(f"{name} must be bounds 0 < low < high, got {bounds}")
+    return low, high
 
 
 def check_end(recovered: Recovered, what: str, *, throw: bool) -> None:

@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Callable
+from typing import Literal
 
 import equinox as eqx
 import jax
@@ -11,11 +12,11 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .. import sky as sky_room
-from .._core.checks import check_function, check_number, check_size, check_type, described
+from .._core.checks import check_function, check_number, check_size
 from .._core.linalg import matmul
 from ..transfer import Transfer
 from ._charts import even_hemisphere, from_hemisphere, tangents, to_hemisphere, to_interval
-from ._checks import check_data, check_end, check_solver
+from ._checks import check_bounds, check_data, check_end, check_solver
 from ._result import Confidence, Recovered, Statistics
 from ._shading import Shading, compress
 from ._solve import confidence, everywhere, levenberg_marquardt
@@ -114,43 +115,42 @@ def fit_sky(
     """
     observed, albedo, weights = check_data(observed, transfer, albedo, weights)
     check_solver(tolerance, max_steps, throw)
-    check_type("turbidity", turbidity, tuple, list)
-    if len(turbidity) != 2:
-        raise ValueError(f"turbidity must be bounds (low, high), got {described(turbidity)}")
-    low, high = (check_number("a bound of turbidity", bound, above=0.0) for bound in turbidity)
-    if not low < high:
-        raise ValueError(f"turbidity must be bounds 0 < low < high, got {turbidity}")
+    bounds = check_bounds("turbidity", turbidity)
     if exposure is not None:
         exposure = check_number("exposure", exposure, above=0.0)
     starts = check_size("starts", starts)
     if sky is not None:
         check_function("sky", sky)
     if sky is None:
-        sky = _preetham(min(transfer.degree, 6), low >= 2.5 and high <= 6)
+        sky = preetham(min(transfer.degree, 6), bounds)
     recovered = _fit(
         observed,
         transfer.coefficients,
         albedo,
         weights,
         sky=sky,
-        bounds=(float(low), float(high)),
+        bounds=bounds,
         exposure=exposure,
         starts=starts,
-        tolerance=_tolerance(observed.dtype) if tolerance is None else tolerance,
+        tolerance=default_tolerance(observed.dtype) if tolerance is None else tolerance,
         max_steps=max_steps,
     )
     check_end(recovered, "the sky was", throw=throw)
     return recovered
 
 
-def _tolerance(dtype) -> float:
+def default_tolerance(dtype) -> float:
     """Tolerance of the last step: where steps converge as Newton's do, the next is its square."""
     return max(1e-5, float(jnp.finfo(dtype).eps) ** 0.5)
 
 
+def preetham(degree: int, bounds: tuple[float, float]) -> Sky:
+    """Preetham's sky of a degree, by the table that holds all turbidities within the bounds."""
+    return _preetham(degree, "wide" if bounds[0] < 2.5 or bounds[1] > 6 else None)
+
+
 @functools.cache
-def _preetham(degree: int, narrow: bool) -> Sky:
-    table = None if narrow else "wide"
+def _preetham(degree: int, table: Literal["wide"] | None) -> Sky:
     return functools.partial(sky_room.preetham_harmonics, degree=degree, table=table)
 
 

@@ -49,8 +49,8 @@ class Confidence(eqx.Module, Generic[Value]):
     `deviation` holds the roots of its diagonal in the value's own form.
 
     It takes errors for independent, of equal size (weights aside) and zero on average. A model
-    that is itself wrong errs all in one way, and by more than this tells. Infinite where the data
-    do not determine all parameters.
+    that is itself wrong errs all in one way, and by more than this tells. Infinite for the numbers
+    that the data do not determine.
 
     **Example**
 
@@ -75,7 +75,7 @@ class Recovered(eqx.Module, Generic[Value]):
     """Value recovered from data, with result code, statistics and confidence.
 
     `result` is an `optimistix.RESULTS`; `message` puts it in words. Made by `fit_sky`,
-    `fit_polygons` and `fit_colors`.
+    `fit_daylight`, `fit_polygons` and `fit_colors`.
 
     **Example**
 

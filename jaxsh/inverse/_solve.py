@@ -127,17 +127,20 @@ def triangle(tall: Float[Array, "v p"]) -> Float[Array, "r p"]:
 
 
 def covariance(jacobian: Float[Array, "r p"], variance: Float[Array, ""]) -> Float[Array, "p p"]:
-    """Covariance variance · (JᵀJ)⁻¹ by singular values; infinite where J lacks full rank."""
+    """Covariance variance · (JᵀJ)⁻¹ by singular values; infinite for what J does not determine."""
     jacobian = triangle(jacobian)
+    missing = max(jacobian.shape[1] - len(jacobian), 0)  # of rows, for the SVD to be complete
+    jacobian = jnp.pad(jacobian, ((0, missing), (0, 0)))
     # Columns of length 1, so that units of parameters do not decide about the rank.
     lengths = jnp.linalg.norm(jacobian, axis=0)
-    scaled = jacobian / jnp.where(lengths > 0, lengths, 1)[None]
-    _, singular, vt = jnp.linalg.svd(scaled, full_matrices=False)
+    lengths = jnp.where(lengths > 0, lengths, 1)
+    _, singular, vt = jnp.linalg.svd(jacobian / lengths[None], full_matrices=False)
     # A column of rounding errors of the size of its elements is about eps long, however tall.
-    full = singular[-1] > 10 * jnp.finfo(jacobian.dtype).eps * jacobian.shape[1]
-    inverse = vt / jnp.where(full, singular, 1)[:, None] / jnp.where(lengths > 0, lengths, 1)[None]
-    spread = variance * matmul(inverse.T, inverse)
-    return jnp.where(full & jnp.all(lengths > 0), spread, jnp.inf)
+    eps = jnp.finfo(jacobian.dtype).eps
+    known = singular > 10 * eps * jacobian.shape[1]
+    inverse = jnp.where(known, 1 / jnp.where(known, singular, 1), 0)[:, None] * vt / lengths[None]
+    free = jnp.any(~known[:, None] & (jnp.abs(vt) > math.sqrt(eps)), axis=0)
+    return jnp.where(free[:, None] | free[None], jnp.inf, variance * matmul(inverse.T, inverse))
 
 
 def confidence(
@@ -150,9 +153,9 @@ def confidence(
     jacobian = jax.jacfwd(lambda step: residual(moved(step)))(still)
     carried = jax.jacfwd(lambda step: ravel_pytree(moved(step))[0])(still)
     spread = covariance(jacobian, variance)
-    whole = jnp.isfinite(spread).all()
-    spread = jnp.where(whole, spread, 0)
+    free = jnp.any((carried != 0) & ~jnp.isfinite(jnp.diagonal(spread))[None], axis=1)
+    spread = jnp.where(jnp.isfinite(spread), spread, 0)
     spread = einsum("ip,pq,jq->ij", carried, spread, carried)
-    spread = jnp.where(whole, spread, jnp.inf)
+    spread = jnp.where(free[:, None] | free[None], jnp.inf, spread)
     _, unravel = ravel_pytree(moved(still))
     return Confidence(spread, unravel(jnp.sqrt(jnp.maximum(jnp.diagonal(spread), 0))))

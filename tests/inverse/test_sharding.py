@@ -66,6 +66,26 @@ def test_sky(kind, lit, rng):
         np.testing.assert_allclose(found.confidence.covariance, expected, rtol=1e-4, atol=1e-18)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_daylight(kind, lit):
+    """By the exact cosine; its harmonics of degree 1 are too few for the search alone."""
+    numbers = (jnp.asarray(x) for x in (3.0, 1.0))
+    truth = inverse.Daylight(
+        jnp.array([0.6, 0.0, 0.8]), *numbers, jnp.full(3, 1e5), jnp.full(3, 0.2)
+    )
+    rest = transfer.shade_diffuse(truth.parts(4, glow)[0], lit, 0.5)
+    cosine = jnp.maximum(lit.normals @ truth.sun, 0)
+    observed = rest + 0.5 / np.pi * cosine[:, None] * truth.facing[None]
+
+    def fit(observed, transfer, sunlit):
+        return inverse.fit_daylight(
+            observed, transfer, 0.5, sunlit=sunlit, sky=glow, exposure=1.0, starts=2
+        )
+
+    check(fit, kind, truth, observed, lit, jnp.ones(COUNT))
+
+
 def lamp(x, radiance):
     corners = [[x, -0.2, 1.5], [x, 0.2, 1.5], [x + 0.4, 0.2, 1.5], [x + 0.4, -0.2, 1.5]]
     return Polygon(jnp.array(corners), jnp.array(radiance))

@@ -6,7 +6,7 @@ import numpy as np
 import optimistix as optx
 import pytest
 
-from jaxsh.inverse._solve import levenberg_marquardt
+from jaxsh.inverse._solve import covariance, levenberg_marquardt
 
 
 @pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
@@ -43,3 +43,18 @@ def test_starts_go_side_by_side_off_the_cpu(monkeypatch):
         for platform in ("cpu", "cuda")
     ]
     assert loops == [2, 1]
+
+
+def test_only_what_the_data_do_not_determine_is_infinite(rng):
+    """The second and the last number are known in their sum alone, the fourth not at all."""
+    tall = rng.normal(size=(9, 5))
+    tall[:, 4], tall[:, 3] = tall[:, 1], 0
+    spread = np.array(covariance(jnp.asarray(tall), jnp.asarray(2.0)))
+    known = [0, 2]
+    others = tall[:, [0, 2, 1]]
+    expected = 2 * np.linalg.inv(others.T @ others)[:2, :2]
+    np.testing.assert_allclose(spread[np.ix_(known, known)], expected, rtol=1e-12)
+    spread[np.ix_(known, known)] = np.inf
+    assert np.isposinf(spread).all()
+    few = covariance(jnp.asarray(tall[:1, :2]), jnp.asarray(2.0))  # fewer rows than numbers
+    assert np.isposinf(few).all()

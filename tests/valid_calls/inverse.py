@@ -1,6 +1,7 @@
 """Valid calls of `jaxsh.inverse`."""
 
 import jax.numpy as jnp
+import numpy as np
 
 from jaxsh import inverse
 
@@ -19,6 +20,21 @@ def calls():
     finite = {"finite": "observed albedo weights", "slow": True}
     return {
         "fit_colors": of(i.fit_colors, **data, lights=[lamp()], upper=9.0, **solver, **finite),
+        "fit_daylight": of(
+            i.fit_daylight,
+            observed=floats(V, 3),
+            surface=floats(V, 3),
+            albedo=floats(V, 3),
+            sunlit=floats(V),
+            sky=glow,
+            turbidity=(2.5, 6.0),
+            exposure=1.0,
+            mask=np.ones(V, bool),
+            starts=2,
+            **solver,
+            finite="observed albedo weights sunlit",
+            slow=True,
+        ),
         "fit_polygons": of(i.fit_polygons, **data, start=[lamp()], turn=True, **solver, **finite),
         "fit_sky": of(
             i.fit_sky,
