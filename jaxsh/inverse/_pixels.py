@@ -3,9 +3,10 @@
 from typing import NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float
 
-from .._core.checks import as_finite, as_float, check_vectors, described
+from .._core.checks import as_finite, as_float, check_type, check_vectors, described
 from ..transfer import Transfer, unshadowed
 from ._checks import check_data
 
@@ -47,10 +48,10 @@ def as_rows(
     normals = normals.reshape(-1, 3)
     seen = jnp.all(jnp.isfinite(normals), axis=1) & jnp.any(normals != 0, axis=1)
     if mask is not None:
-        mask = jnp.asarray(mask)
+        check_type("mask", mask, Array, np.ndarray)
         if mask.shape != places or mask.dtype != bool:
             raise ValueError(f"expected mask {places} of booleans, got {described(mask)}")
-        seen = seen & mask.reshape(-1)
+        seen = seen & jnp.asarray(mask).reshape(-1)
     transfer = surface if given else unshadowed(jnp.zeros_like(normals), normals, degree)
     if weights is None:
         weights = seen.astype(transfer.dtype)
