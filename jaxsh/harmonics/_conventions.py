@@ -80,7 +80,7 @@ def _named() -> dict[str, Convention]:
             about="EXT_lights_image_based, irradianceCoefficients as Babylon.js reads them",
         ),
         "filament-sh": replace(signed, axes="y-up", layout="channels-last", about="cmgen --sh"),
-        "filament-sh-irradiance": replace(
+        "filament-irradiance": replace(
             signed,
             axes="y-up",
             layout="channels-last",

@@ -176,7 +176,7 @@ def write_light(
 
     - `.json`: a LightProbe for three.js' ObjectLoader.
     - `.txt`: as Filament's cmgen prints it, "filament" (pre-scaled irradiance, its `sh.txt`)
-      unless `convention` is "filament-sh" or "filament-sh-irradiance".
+      unless `convention` is "filament-sh" or "filament-irradiance".
     - `.npz`: an array "coefficients", in any convention, with the convention's name and facts, so
       that `read_light` needs no more; any batch in front. Without conversion to the last bit.
     - `.npy`: the same array alone. `read_light` has to be told its convention.

@@ -23,7 +23,7 @@ ROUNDED = {"three": 6e-6, "@babylonjs/core": 4e-15, "DirectXMath": 2e-6, "kaolin
 def in_ours(name: str, directions) -> np.ndarray:
     """Directions in a package's axes, written in ours: from its documentation, not its facts."""
     x, y, z = np.asarray(directions).T
-    if name in ("three.js", "gltf", "filament", "filament-sh", "filament-sh-irradiance"):
+    if name in ("three.js", "gltf", "filament", "filament-sh", "filament-irradiance"):
         turned = (x, -z, y)  # right-handed, y up
     elif name in ("unity", "babylon.js"):
         turned = (-x, -z, y)  # left-handed, y up; glTF comes in with x turned round
@@ -114,7 +114,7 @@ PUBLISHED = {
     "unity": (unity, "irradiance/pi"),
     "filament": (filament, "irradiance/pi"),
     "filament-sh": (signed, "radiance"),
-    "filament-sh-irradiance": (signed, "irradiance"),
+    "filament-irradiance": (signed, "irradiance"),
     "unreal": (lambda given, *xyz: signed(given.T, *xyz), "radiance"),
     "habel": (signed, "radiance"),
     "alicevision": (alicevision, "irradiance/pi"),

@@ -14,7 +14,7 @@ from ._stored import Stored
 # What a line's comment says behind its label, and the convention that this is.
 SAYS = {
     "filament": ", irradiance, pre-scaled base",
-    "filament-sh-irradiance": ", irradiance",
+    "filament-irradiance": ", irradiance",
     "filament-sh": "",
 }
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*(e[-+]?\d+)?|\.\d+(e[-+]?\d+)?|nan|inf)", re.I)
