@@ -28,6 +28,7 @@ class Coarse(NamedTuple):
     solid_angle: Float[np.ndarray, "h w"]
     rows: Int[np.ndarray, " h+1"]
     columns: Int[np.ndarray, " w+1"]
+    weights: Float[np.ndarray, " H"]  # solid angle of a pixel of each of the picture's rows
 
     @classmethod
     def of(cls, image: Float[np.ndarray, "H W c"]) -> "Coarse":
@@ -43,7 +44,7 @@ class Coarse(NamedTuple):
             row = np.einsum("hwc,h->w", image[first:last], weight, dtype=np.float64)
             flux[i] = np.add.reduceat(row, columns[:-1])
             solid_angle[i] = weight.sum() * counts
-        return cls(flux / solid_angle, solid_angle, rows, columns)
+        return cls(flux / solid_angle, solid_angle, rows, columns, weights)
 
     def level(self, threshold: float) -> float:
         """The mean m of the brightness where that is cut off at `threshold` times m itself.

@@ -11,7 +11,6 @@ from jaxtyping import Array, ArrayLike, Bool, Float
 from .._core.checks import as_host_float, check_finite, check_number, check_size, said_dtype
 from .._core.pictures import check_shape
 from ._bright_regions import Coarse, grown
-from ._quadrature import fejer_weights
 from ._suns import Suns, local_frames
 
 _RING = 2  # cells around a source that say what is behind it
@@ -134,8 +133,7 @@ def _take(
     before = rest[rows, columns]
     after = np.minimum(before, np.median(behind, axis=0).astype(rest.dtype)[None])
     rest[rows, columns] = after
-    height, width, _ = rest.shape
-    solid_angle = fejer_weights(height)[rows] * 2 * np.pi / width
+    solid_angle = coarse.weights[rows]
     flux = (before.astype(np.float64) - after) * solid_angle[:, None]
     kept = flux.any(axis=1)
     return _Source(rows[kept], columns[kept], flux[kept], solid_angle[kept])
