@@ -5,6 +5,7 @@ light, random paths for what bounces. Both are unbiased for a probe of constant 
 as two independent halves whose difference tells their own error.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -127,16 +128,28 @@ def direct(
     """Σ max(0, n·ω) values(ω) over all directions, and over those that are not blocked."""
     unshadowed = np.empty((len(receivers.normals), values.shape[1]), np.float32)
     shadowed = np.empty_like(unshadowed)
-    for part in context.progress(_parts(len(unshadowed), len(directions)), "quadrature"):
-        cosines = np.maximum(receivers.normals[part] @ directions.T, 0)
+    for part, cosines, seen in seen_cosines(scene, receivers, directions, context):
         unshadowed[part] = cosines @ values
+        shadowed[part] = seen @ values
+    return unshadowed, shadowed
+
+
+def seen_cosines(
+    scene: geometry.RayScene,
+    receivers: Receivers,
+    directions: Float[np.ndarray, "n 3"],
+    context: Context,
+) -> Iterator[tuple[slice, Float[np.ndarray, "part n"], Float[np.ndarray, "part n"]]]:
+    """max(0, n·ω) of some vertices at a time, and the same, zero where something is in the way."""
+    for part in context.progress(_parts(len(receivers.normals), len(directions)), "quadrature"):
+        cosines = np.maximum(receivers.normals[part] @ directions.T, 0)
         vertex, direction = np.nonzero(cosines)
         blocked = scene.occluded(
             np.take(receivers.origins[part], vertex, axis=0), np.take(directions, direction, axis=0)
         )
-        cosines[vertex[blocked], direction[blocked]] = 0
-        shadowed[part] = cosines @ values
-    return unshadowed, shadowed
+        seen = cosines.copy()
+        seen[vertex[blocked], direction[blocked]] = 0
+        yield part, cosines, seen
 
 
 def one_bounce(
