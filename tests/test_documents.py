@@ -40,6 +40,8 @@ def test_blocks_run_in_order(page, tmp_path):
 
     Names and files that a page takes from its reader are made small by `tests/documents/PAGE.py`.
     """
+    if "import torch" in "".join(blocks(page)):
+        pytest.importorskip("torch", reason=f"torch is not installed: {page.name} is not tried")
     before = ROOT / "tests" / "documents" / f"{page.stem}.py"
     stand_in = [before.read_text("utf-8")] if before.exists() else []
     script = tmp_path / "blocks.py"
