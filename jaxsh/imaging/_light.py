@@ -6,7 +6,6 @@ import warnings
 from pathlib import Path
 from typing import Literal
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
@@ -26,8 +25,6 @@ from ..harmonics import Convention, conventions, convert, rotate
 from ._light_files import FORMATS, SAYS, Stored, cmgen_file, npz_file, read_stored, three_file
 
 _OWN = "jaxsh"
-# One program for a convention and a shape, in place of ten small ones.
-_converted = jax.jit(convert, static_argnums=(1, 2))
 # What a format is written in: its own conventions, or, of arrays, any.
 _SAID = {".json": ("three.js",), ".txt": tuple(SAYS), ".npz": (), ".npy": ()}
 _ELSEWHERE = {".ply": "splats are read by imaging.read_splats"}
@@ -47,7 +44,7 @@ def read_light(
     - `.txt`: what Filament's cmgen prints, whose comments say whether it is radiance (`--sh`),
       irradiance or irradiance "pre-scaled" (`sh.txt`); or any three numbers a line.
     - `.gltf`, `.glb`: the scene's light of EXT_lights_image_based, times its intensity, turned by
-      its rotation. The specification leaves the sign open; `docs/what-is-read.md` says more.
+      its rotation; as Babylon.js reads it, since the specification leaves signs open.
     - `.npz`: what `write_light` wrote, or an array "coefficients" beside a "convention", or any.
     - `.npy`: any array.
 
@@ -137,7 +134,7 @@ def _in_ours(
     values = _floats(stored.values)
     if values.ndim == 1 and facts.layout == "channels-last":
         values = values.reshape(-1, 3) if values.size % 3 == 0 else values
-    light = np.asarray(_converted(values, facts, _OWN))
+    light = np.asarray(convert(values, facts, _OWN))
     if light.ndim == 1 or light.shape[-2] == 1:
         rows = light if light.ndim > 1 else light[None]
         light = np.broadcast_to(rows, (*rows.shape[:-2], 3, rows.shape[-1]))
@@ -224,7 +221,7 @@ def write_light(
     check_place(path)
     facts = _facts(convention, up, None)
     try:
-        values = np.asarray(_converted(_fitted(light, facts.degree, bool(said)), _OWN, facts))
+        values = np.asarray(convert(_fitted(light, facts.degree, bool(said)), _OWN, facts))
     except ValueError as error:
         raise ValueError(f"{path}: cannot be written: {reason(error, 350)}") from error
     if not np.isfinite(values).all():

@@ -50,7 +50,7 @@ def _txt() -> list[bytes]:
 
 
 def _fields() -> dict:
-    factors = np.pi * np.array([1, *[2 / 3] * 3, *[1 / 4] * 5])[:, None]
+    factors = np.pi * np.array([1, -2 / 3, 2 / 3, -2 / 3, *[1 / 4, -1 / 4] * 2, 1 / 4])[:, None]
     one = {
         "name": "sky",
         "intensity": 2.0,

@@ -91,7 +91,7 @@ def test_gltf_is_irradiance_turned_by_its_rotation(tmp_path):
     back = NORMALS @ turn.as_matrix()
     for name, content in (("a.gltf", fields), ("a.glb", files.glb(fields))):
         light = read_light(written(tmp_path / name, content))
-        expected = 2.5 * files.signed(values * SIGNS, back)
+        expected = 2.5 * files.signed(values, back)
         np.testing.assert_allclose(irradiance(light), expected, rtol=0, atol=1e-12)
 
 
