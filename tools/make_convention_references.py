@@ -2,7 +2,7 @@
 
     python -m venv references && . references/bin/activate && cd references
     pip install pyshtools e3nn-jax sphericart scipy torch gsplat
-    npm install three @babylonjs/core
+    npm install three @babylonjs/core filament
     git clone --depth 1 https://github.com/microsoft/DirectXMath
     git clone --depth 1 https://github.com/NVIDIAGameWorks/kaolin
     python ../tools/make_convention_references.py .
@@ -31,12 +31,15 @@ DEGREE, COUNT = 4, 5
 
 _NODE = """
 import {{ readFileSync }} from "node:fs";
+import {{ createRequire }} from "node:module";
 import {{ Vector3, SphericalHarmonics3 }} from "three";
 import {{ Vector3 as Vector, Color3 }} from "@babylonjs/core/Maths/math.js";
 import {{ SphericalHarmonics }} from "@babylonjs/core/Maths/sphericalPolynomial.js";
 
 const given = JSON.parse(readFileSync("{given}"));
-const found = {{ radiance: [], irradiance: [], lights: [], gltf: [] }};
+const found = {{ radiance: [], irradiance: [], lights: [], gltf: [], filament: [] }};
+globalThis.self = globalThis;
+const filament = await createRequire(import.meta.url)("filament/filament.js")({{}});
 const sh = new SphericalHarmonics3().fromArray(given.coefficients.flat());
 const harmonics = SphericalHarmonics.FromArray(given.coefficients);
 harmonics.convertIrradianceToLambertianRadiance();
@@ -46,6 +49,10 @@ for (const [x, y, z] of given.directions) {{
     const normal = new Vector3(x, y, z);
     found.radiance.push(sh.getAt(normal, new Vector3()).toArray());
     found.irradiance.push(sh.getIrradianceAt(normal, new Vector3()).toArray());
+    // It takes where the light goes, and gives the color over its largest part, and that part.
+    const [r, g, b, most] = filament.IndirectLight.getColorEstimate(
+        given.coefficients.flat(), [-x, -y, -z]);
+    found.filament.push([r * most, g * most, b * most]);
     const light = new SphericalHarmonics();
     light.addLight(new Vector(x, y, z), new Color3(1, 2, 3), 1);
     found.lights.push(names.map((name) => light[name].asArray()));
@@ -55,6 +62,7 @@ for (const [x, y, z] of given.directions) {{
     found.gltf.push([0, 1, 2].map((c) => terms.reduce((s, t, i) => s + t * scaled[i][c], 0)));
 }}
 console.log(JSON.stringify(found));
+process.exit(0);
 """
 
 
@@ -197,6 +205,7 @@ def cloned(folder: Path, name: str) -> str:
 
 def of_node(folder: Path):
     given, at = RNG.normal(size=(9, 3)), directions()
+    given[0] += 9  # Filament's estimate wants positive light
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         data, script = Path(scratch, "given.json"), Path(scratch, "evaluate.mjs")
         data.write_text(json.dumps({"coefficients": given.tolist(), "directions": at.tolist()}))
@@ -204,7 +213,7 @@ def of_node(folder: Path):
         run = subprocess.run(["node", script], check=True, capture_output=True, text=True)
     found = json.loads(run.stdout)
     said = {}
-    for package in ("three", "@babylonjs/core"):
+    for package in ("three", "@babylonjs/core", "filament"):
         facts = json.loads((folder / "node_modules" / package / "package.json").read_text())
         said[package] = f"{package} {facts['version']}"
 
@@ -226,6 +235,13 @@ def of_node(folder: Path):
         "SphericalHarmonics, as the glTF loader prepares them",
         found["gltf"],
         quantity="irradiance/pi",
+    )
+    yield made(
+        "filament",
+        "filament",
+        "IndirectLight.getColorEstimate",
+        found["filament"],
+        quantity="irradiance",
     )
     # Light from one direction, whose coefficients are the basis there.
     yield made(

@@ -17,7 +17,13 @@ from jaxsh import harmonics
 FILE = pathlib.Path(__file__).with_name("convention_references.json")
 REFERENCES = json.loads(FILE.read_text("utf-8"))
 # Constants of six digits, and single precision.
-ROUNDED = {"three": 6e-6, "@babylonjs/core": 4e-15, "DirectXMath": 2e-6, "kaolin": 1e-10}
+ROUNDED = {
+    "three": 6e-6,
+    "@babylonjs/core": 4e-15,
+    "DirectXMath": 2e-6,
+    "kaolin": 1e-10,
+    "filament": 1e-6,
+}
 
 
 def in_ours(name: str, directions) -> np.ndarray:
