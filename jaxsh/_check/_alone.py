@@ -11,9 +11,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
-from ..harmonics import conventions, degrees
+from ..harmonics import degrees
 from ..sphere import fibonacci
 from ._given import Reading
+from ._known import same_layout
 from ._placements import values
 from ._space import Combination, Space, space
 from ._verdict import Verdict
@@ -36,9 +37,7 @@ def check_alone(readings: list[Reading]) -> Verdict:
         table = space(degree, whole)
         known: dict[tuple[int, int, int], float] = {}
         for name, at in table.named.items():
-            layout = conventions()[name].layout
-            fits = reading.hides_layout and layout != "cosine-sine"
-            if (layout != reading.layout and not fits) or reading.said:
+            if not same_layout(name, reading):
                 continue
             key = at.order, at.normalization, at.quantity
             if key not in known:

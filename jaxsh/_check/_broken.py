@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from ..harmonics import degrees
 from ._decide import Case, Choice, Decision, near_one
-from ._known import convention_of, judge, residuals
+from ._known import convention_of, judge, residuals, same_layout
 from ._matching import Match, constants, described, match
 from ._search import numbers
 from ._space import Space, space
@@ -21,7 +21,7 @@ _MATCHED = 3
 _TOLERANCES = 4e-3, 0.02, 0.06
 _CHANCE = 1e-3
 # What is no further off may be noise, and is further than so few coefficients allow.
-_NEAR = 0.35
+_NEAR = 0.2
 # Named conventions are as good as the best within this factor.
 _ALIKE = 1.5
 # A turn by any angle is believed where it leaves no more than this of the error.
@@ -88,7 +88,11 @@ def _by_chance(best: Choice, decision: Decision, found: list[Case], table: Space
     """The verdict where a fit is good enough for noise, and not good enough to be no chance."""
     errors = residuals(found, table)
     convention = convention_of(best, table)
-    near = tuple(name for name, error in errors.items() if error <= _ALIKE * best.error)
+    near = tuple(
+        name
+        for name, error in errors.items()
+        if error <= _ALIKE * best.error and same_layout(name, best.case.reading)
+    )
     said = ", ".join(facts(convention, gray=best.case.reading.hides_layout).values())
     return Verdict(
         decided=False,

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
@@ -17,6 +18,10 @@ from ._known import furnace, judge
 from ._search import FLOOR
 from ._space import space
 from ._verdict import Verdict
+from ._words import percent
+
+# A picture with a larger part of its values at the maximum has been cut off there.
+_CLIPPED = 1e-3
 
 
 def check(
@@ -114,13 +119,18 @@ def _strongest(reading: Reading) -> Reading:
 
 def _from_picture(readings: list[Reading], picture: np.ndarray) -> Verdict:
     most = (min(picture.shape[:2]) - 1) // 2
-    return _verdict(
+    verdict = _verdict(
         readings,
         lambda degree, channels: of_picture(picture, min(degree, most), channels),
         lambda degree, channels: mistaken(picture, min(degree, most), channels),
         strength=True,
         most=most,
     )
+    largest = float(np.mean(picture == picture.max()))
+    if verdict.decided or largest < _CLIPPED or np.ptp(picture) == 0:
+        return verdict
+    note = f"the picture is clipped: {percent(largest)} of its values are the largest one"
+    return replace(verdict, notes=(*verdict.notes, note))
 
 
 def _verdict(readings, lights, mistakes, *, strength: bool, most: int = MOST) -> Verdict:

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..harmonics import Convention, conventions
 from ._decide import Case, Choice, Decision, beside, near_one
+from ._given import Reading
 from ._matching import Fault, constants, described
 from ._space import Combination, Space
 from ._verdict import Verdict
@@ -77,9 +78,9 @@ def judge(
         unsure = [key for key in said if key not in certain]
         for other, word in list(zip(others, words, strict=True))[:_SHOWN]:
             differs = [word[key] for key in word if word[key] != said.get(key)]
-            open_.append(
-                f"{', '.join(differs) or 'another order'} fits as well, to {percent(other.error)}"
-            )
+            if "order" in said and "order" not in word:
+                differs.append("m from −l to l")
+            open_.append(f"{', '.join(differs)} fits as well, to {percent(other.error)}")
         if len(others) > _SHOWN:
             open_.append(f"and {len(others) - _SHOWN} more do")
         open_.append(_remedy(best.case, unsure, space, strength))
@@ -167,14 +168,19 @@ def _say_case(case: Case, faults: list[str], notes: list[str]) -> None:
         faults.append(case.light.said)
 
 
+def same_layout(name: str, reading: Reading) -> bool:
+    """True where nothing shows that a named convention has another layout than what was given."""
+    layout = conventions()[name].layout
+    hidden = reading.hides_layout and layout != "cosine-sine"
+    return (layout == reading.layout or hidden) and not reading.said
+
+
 def _named(best: Choice, space: Space, strength: bool) -> tuple[tuple[str, ...], dict[str, str]]:
     """Named conventions that agree, and those that do but for one thing."""
     agree, scaled, laid, turned = [], {}, {}, {}
     reading = best.case.reading
     for name, at in space.named.items():
-        layout = conventions()[name].layout
-        hidden = reading.hides_layout and layout != "cosine-sine"
-        other = (layout != reading.layout and not hidden) or reading.said
+        layout, other = conventions()[name].layout, not same_layout(name, reading)
         if space.map[at] == space.map[best.at]:
             scale = float(best.case.fits.scale[at])
             off = strength and not near_one(scale, best.error)

@@ -33,7 +33,7 @@ def turned_light(light: Float[np.ndarray, "c k"], angle: float) -> Float[np.ndar
 
 def look_for_turn(found: list[Case], space: Space, free_scale: bool) -> Turned | None:
     """Find the angle at which some combination fits, if there is one."""
-    plain = [case for case in found if not case.light.said and not case.reading.said]
+    plain = [case for case in found if case.cost == 0]
     if not plain or space.degree < 1:
         return None
 

@@ -40,7 +40,7 @@ def random_convention(rng, degree):
     )
 
 
-def trial(rng, *, degree, channels, noise, height, scaled, direction=False):
+def trial(rng, *, degree, channels, noise, height, scaled, direction=False, other=False):
     """One verdict with what it should have been: "right", "open", "none" or "wrong"."""
     true = random_convention(rng, degree)
     if channels == 1 and true.layout != "cosine-sine":
@@ -58,6 +58,9 @@ def trial(rng, *, degree, channels, noise, height, scaled, direction=False):
         directions, solid = samples.pixels(height)
         basis = np.asarray(harmonics.evaluate(directions, degree))
         light = np.einsum("hwc,hwk,hw->ck", image, basis, solid)
+    if other:  # what is known is of another light
+        known = {"direction": rng.normal(size=3)} if direction else known
+        known = known if direction else {"picture": samples.picture(rng, height, channels)}
     shape = np.linalg.norm(light[:, 1:]) / np.sqrt(light[:, 1:].size)
     spoilt = light + noise * shape * rng.normal(size=light.shape)
     scale = 2.0 ** rng.uniform(-4, 4) if scaled else 1.0

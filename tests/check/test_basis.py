@@ -30,6 +30,7 @@ def test_scipys_is_condon_shortley():
     assert "orthonormal" in verdict.summary
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(harmonics.conventions()))
 def test_each_convention_is_recognized(name):
     known = harmonics.conventions()[name]
