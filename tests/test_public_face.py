@@ -46,6 +46,7 @@ REASONS = {
         "write_light": HOST,
         "write_splats": HOST,
     },
+    "inverse": {"light_variances": NO_ARRAYS},
     "midrange": {"grid_around": ONE, "place_samples": HOST, "update_samples": HOST},
     "plot": dict.fromkeys(["bands", "light", "lobes"], HOST),
     "sky": {

@@ -118,6 +118,21 @@ def test_polygons(kind, lit):
     check(fit, kind, inverse.rectangle_of(truth), seen(lit, [truth]), lit)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("loss", ["squares", "cauchy"])
+def test_light(loss, kind, lit, rng):
+    observed = jnp.asarray(rng.uniform(0.1, 1, (COUNT, 3)))
+
+    def fit(observed, normals):
+        return inverse.fit_light(
+            observed, normals, 0.5, 1, prior=np.array([0.3, 0.1]), loss=loss, throw=False
+        )
+
+    expected = jax.jit(fit)(observed, lit.normals)
+    check(fit, kind, expected.value, observed, lit.normals)
+
+
 @pytest.mark.parametrize("rows", [6, 64])
 def test_triangle(rows, rng):
     """R of QR but for signs: the same Gram matrix, and singular values."""

@@ -44,7 +44,15 @@ def table(module: str) -> dict[str, Call]:
 MADE = {
     "_check": {"Verdict"},
     "adaptive": {"AbstractMethod", "AdaptiveResult", "StagedTransfer", "Tiling"},
-    "inverse": {"Confidence", "Daylight", "Recovered", "Rectangle", "SkyLight", "Statistics"},
+    "inverse": {
+        "Confidence",
+        "Daylight",
+        "Recovered",
+        "RecoveredLight",
+        "Rectangle",
+        "SkyLight",
+        "Statistics",
+    },
     "geometry": {"BaseColor", "Hit", "Mesh", "RayScene", "RayTree", "Topology", "Trace"},
     "imaging": {"Raster"},
     "midrange": {"Update", "Weights"},

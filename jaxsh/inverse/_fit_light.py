@@ -1,0 +1,157 @@
+"""Light from all around, in spherical harmonics, from the shading of a diffuse surface."""
+
+from typing import Any, Literal
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, Bool, Float
+
+from .._core.checks import as_host_float, check_choice, check_degree, check_number
+from ..transfer import Transfer
+from ._checks import check_end, check_solver
+from ._light_prior import power_law
+from ._light_recover import Loss, recover
+from ._light_result import RecoveredLight
+from ._pixels import as_rows
+from ._solve import everywhere
+
+# Bands of the light that a picture with normals is fitted with, under a prior: what lies above
+# shifts irradiance by less than 0.3 % (`python -m experiments run inverse.light`).
+_BANDS = 12
+_WINDOWS = "none", "hann", "lanczos", "zonal-sinc"
+
+
+def fit_light(
+    observed: Float[ArrayLike, "*pixels 3"],
+    surface: Transfer | Float[ArrayLike, "*pixels 3"],
+    albedo: Float[ArrayLike, "..."],
+    degree: int,
+    *,
+    mask: Bool[ArrayLike, "*pixels"] | None = None,
+    weights: Float[ArrayLike, "*pixels"] | None = None,
+    prior: Literal["probes"] | Float[ArrayLike, " bands"] | None = "probes",
+    noise: float | None = None,
+    loss: Loss = "squares",
+    window: Literal["none", "hann", "lanczos", "zonal-sinc"] = "none",
+    tolerance: float | None = None,
+    max_steps: int = 100,
+    throw: bool = True,
+) -> RecoveredLight:
+    """Finds the light, in spherical harmonics, that shaded a diffuse surface of known albedo.
+
+    Least squares, for shading is linear in the light: min Σ_v w_v² ‖observed_v − albedo_v/π ·
+    T_v L‖² + σ² Σ_i L_i²/(s² p_i), by QR of the matrix itself, never of its square. The second
+    sum is the prior. From one view half of the normals are missing, and what they would tell is
+    then not zero or noise times a thousand, but what is usual: coefficients of degree l >= 1 are
+    taken for Gaussian with variances p_l relative to the square of the mean light s, the constant
+    coefficient of the same channel, which itself is free.
+
+    Under a prior the bands above `degree` are unknowns too, and then cut off: a transfer's all, of
+    normals those up to 12. The light that is there anyway would else be taken for that of lower
+    bands, which is most of the error of plain least squares.
+
+    **Arguments**
+
+    - `observed`: radiance that leaves the surface, linear: (V, 3), or a picture (H, W, 3).
+    - `surface`: the vertices' `Transfer`, or normals of the shape of `observed`, of any length, in
+      the axes that the light shall have; these see all of the sphere above their own horizon.
+    - `albedo`: a number, (3,), or of each vertex or pixel with one or three channels.
+    - `degree`: of the light; 2 is what a diffuse surface without shadows can tell.
+    - `mask`: False where nothing was observed. `weights`: one over the expected error, at least 0.
+      Where either is zero, or a normal is not finite or zero, observed may hold any number.
+    - `prior`: `"probes"`, `light_variances`; or variances of your own of the bands 1, 2, …, as many
+      as there are unknown bands, at least `degree`; or None for least squares alone.
+    - `noise`: the standard deviation σ of what was observed at weight 1. By default it is
+      estimated: by the largest marginal likelihood, or without a prior from the residuals.
+    - `loss`: `"squares"`; or, against highlights and shadows that the surface does not account
+      for, `"huber"` or `"cauchy"` of a pixel's length of error, with the thresholds 1.345 σ and
+      2.385 σ. Iterated reweighting, from squares on; σ by the median unless given.
+    - `window`: `harmonics.window` to multiply the light by in the end.
+    - `tolerance`, `max_steps`, `throw`: of the reweighting, on the light relative to its length;
+      1e-6, and √ε in float32, by default.
+
+    **Returns** a `RecoveredLight` with the light (3, K) in the surface's dtype. Its `confidence` is
+    the posterior's, σ and the mean light taken as known: it tells honestly what is unseen as far as
+    the light is one like the probes. Without a prior what is not determined is 0, with an infinite
+    deviation. `determined` tells coefficient by coefficient what the data decided. Normals alone
+    tell nothing of odd bands from 3 on.
+
+    Differentiable in observed, albedo, weights and the surface where `loss` is `"squares"`: the
+    value, with an estimated σ taken as a constant; the rest of the result is one. `jit` and `vmap`
+    as you like.
+
+    Raises `ValueError` for shapes that do not fit, and, where values are known, for data that are
+    not finite, all zero, or weighted by less than 0.
+
+    Vertices, or rows of a picture, may be shared out over a mesh of devices.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import inverse, sphere
+    >>> light = jnp.asarray([[3.0, 1.0, 0.5, 0.2], [3.0, 0.8, 0.5, 0.1], [3.0, 0.5, 0.5, 0.0]])
+    >>> normals = sphere.fibonacci(100).directions
+    >>> observed = 0.5 / jnp.pi * sphere.irradiance(light, normals)
+    >>> found = inverse.fit_light(observed, normals, 0.5, 1)
+    >>> [round(float(c), 2) for c in found.value[0]]
+    [3.0, 1.0, 0.5, 0.2]
+    """
+    degree = check_degree(degree)
+    check_solver(tolerance, max_steps, throw)
+    check_choice("loss", loss, ("squares", "huber", "cauchy"))
+    check_choice("window", window, _WINDOWS)
+    if noise is not None:
+        noise = check_number("noise", noise, above=0.0)
+    given = isinstance(surface, Transfer)
+    if given and surface.degree < degree:
+        raise ValueError(
+            f"a light of degree {degree} needs a transfer of that degree, got degree "
+            f"{surface.degree}"
+        )
+    variances = _variances(prior, degree, surface.degree if given else max(degree, _BANDS))
+    rows = as_rows(observed, surface, albedo, weights, mask, 0)
+    dtype = rows.observed.dtype
+    default = max(1e-6, float(jnp.finfo(dtype).eps) ** 0.5)
+    recovered = _fit(
+        rows.observed,
+        rows.transfer.coefficients if given else rows.transfer.normals,
+        rows.albedo,
+        rows.weights,
+        None if noise is None else jnp.asarray(noise, dtype),
+        variances,
+        degree=degree,
+        given=given,
+        loss=loss,
+        kind=window,
+        tolerance=default if tolerance is None else tolerance,
+        max_steps=max_steps,
+    )
+    check_end(recovered, "the light was", throw=throw)
+    return recovered
+
+
+def _variances(prior: Any, degree: int, most: int) -> Float[np.ndarray, " bands"] | None:
+    """Variances of the bands 1 to the last unknown one; None without a prior, or with no band."""
+    if prior is None or most == 0:
+        return None
+    if isinstance(prior, str):
+        check_choice("prior", prior, ("probes",))
+        return power_law(most)
+    given = as_host_float(prior, "prior")
+    if given.ndim != 1 or not max(degree, 1) <= len(given) <= most:
+        raise ValueError(
+            f"expected prior as variances of {max(degree, 1)} to {most} bands, got shape "
+            f"{given.shape}"
+        )
+    if not (np.isfinite(given).all() and given.min() > 0):
+        raise ValueError(f"variances of a prior must be finite and > 0, got {given.min():g}")
+    return given
+
+
+@eqx.filter_jit
+def _fit(observed, rows, albedo, weights, noise, variances, **options) -> RecoveredLight:
+    def fit(*arrays):
+        return recover(*arrays, **options)
+
+    return everywhere(fit, observed, rows, albedo, weights, noise, variances)

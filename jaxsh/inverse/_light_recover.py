@@ -1,0 +1,184 @@
+"""Compiled part of `fit_light`: from checked rows to the light and how surely it is known."""
+
+import functools
+import math
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from .._core.linalg import einsum, matmul
+from .._core.xla import in_blocks
+from ..harmonics import clamped_cosine, convolve, degrees, evaluate, num_coefficients, window
+from ._light_result import RecoveredLight
+from ._light_solve import Solution, compress_rows, solve_plain, solve_with_prior
+from ._result import Confidence, Statistics
+
+Loss = Literal["squares", "huber", "cauchy"]
+
+# Thresholds of 95 % efficiency on Gaussian errors, in these' deviations, and the median of the
+# length of three such errors over √3.
+_HUBER, _CAUCHY, _MEDIAN = 1.345, 2.385, 0.888
+_SHARES = {
+    "huber": lambda error: _HUBER / jnp.maximum(error, _HUBER),
+    "cauchy": lambda error: 1 / (1 + (error / _CAUCHY) ** 2),
+}
+
+
+def recover(
+    observed, rows, albedo, weights, noise, variances, *, degree, given, loss, kind, **iteration
+) -> RecoveredLight:
+    dtype = observed.dtype
+    bands = degree if variances is None else len(variances)
+    columns = _columns(bands, given)
+    relative = None
+    if variances is not None:
+        every = jnp.concatenate([jnp.ones(1, dtype), variances.astype(dtype)])
+        relative = every[degrees(bands)]
+
+    def make(rows):
+        if given:
+            return rows[:, columns]
+        cosine = clamped_cosine(bands).astype(dtype)
+        up = jnp.asarray([[0.0, 0.0, 1.0]], dtype)
+        fine = jnp.all(jnp.isfinite(rows), axis=1) & jnp.any(rows != 0, axis=1)
+        return convolve(evaluate(jnp.where(fine[:, None], rows, up), bands), cosine)[:, columns]
+
+    def solve(observed, rows, albedo, trust) -> tuple[Solution, Array]:
+        small = compress_rows(observed, rows, albedo, trust, make)
+        operator = jnp.broadcast_to(small.operator, (3, *small.operator.shape[1:])) / small.scale
+        count = jnp.sum(trust > 0).astype(dtype)
+        level = None if noise is None else noise / small.scale
+        if relative is None:
+            return solve_plain(operator, small.target, count, level), small.scale
+        found = solve_with_prior(operator, small.target, relative[columns], count, level)
+        return found, small.scale
+
+    data = jax.lax.stop_gradient((observed, rows, albedo))
+    trust = jax.lax.stop_gradient(weights)
+    if loss == "squares":
+        found, scale = solve(*data, trust)
+        result, steps = optx.RESULTS.successful, jnp.ones((), jnp.int32)
+    else:
+
+        def again(share, _):
+            """Shares with which pixels count, from those with which they did."""
+            found, scale = solve(*data, trust * jnp.sqrt(share))
+            error = _length(found.light, *data, trust, make)
+            level = _level(error, trust) if noise is None else noise
+            return _SHARES[loss](error / level), (found, scale)
+
+        ended = optx.fixed_point(
+            again,
+            optx.FixedPointIteration(0.0, iteration["tolerance"]),
+            jnp.ones_like(trust),
+            has_aux=True,
+            max_steps=iteration["max_steps"],
+            throw=False,
+        )
+        found, scale = ended.aux
+        result, steps = ended.result, ended.stats["num_steps"]
+    light = found.light
+    if loss == "squares":
+        still = found.light, found.inverse, found.pull
+        light = _attached(make)(*still, scale, observed, rows, albedo, weights)
+    statistics = Statistics(
+        steps=steps,
+        residual=found.residual,
+        agreeing=jnp.ones((), jnp.int32),
+        starts=1,
+        at_bound=jnp.zeros((), bool),
+    )
+    return _whole(light, found, scale, relative, columns, degree, kind, result, statistics)
+
+
+def _columns(bands: int, given: bool) -> np.ndarray:
+    """Coefficients that irradiance depends on: of normals none of odd degree but 1."""
+    l = degrees(bands)
+    return np.flatnonzero((l % 2 == 0) | (l == 1) | given)
+
+
+def _length(light, observed, rows, albedo, weights, make) -> Float[Array, " v"]:
+    """Root mean square over the channels of each pixel's error, weighted."""
+    albedo = albedo.reshape((1,) * (2 - albedo.ndim) + albedo.shape)
+    irradiance = in_blocks(lambda rows: matmul(make(rows), light.T), rows, size=2**12)
+    error = jnp.where(weights[:, None] > 0, observed - albedo / math.pi * irradiance, 0)
+    return weights * jnp.linalg.norm(error, axis=1) / math.sqrt(3)
+
+
+def _level(error: Float[Array, " v"], weights: Float[Array, " v"]) -> Float[Array, ""]:
+    """Standard deviation of errors most of which are Gaussian."""
+    seen = weights > 0
+    half, most = jnp.sum(seen) / 2, jnp.max(jnp.where(seen, error, 0))
+    # By halving, not by sorting: a mesh of devices would have to gather what is sorted.
+    span = -math.log(jnp.finfo(error.dtype).eps)
+
+    def halve(_, bounds):
+        low, high = bounds
+        middle = (low + high) / 2
+        few = jnp.sum(seen & (error <= most * jnp.exp(middle))) < half
+        return jnp.where(few, middle, low), jnp.where(few, high, middle)
+
+    start = jnp.full((), -span, error.dtype), jnp.zeros((), error.dtype)
+    _, median = jax.lax.fori_loop(0, 32, halve, start)
+    return jnp.maximum(most, jnp.finfo(error.dtype).tiny ** 0.5) * jnp.exp(median) / _MEDIAN
+
+
+def _attached(make):
+    """The light as it is, with the derivatives that the implicit function theorem gives it."""
+
+    def slope(light, pull, scale, observed, rows, albedo, weights):
+        """Minus half the slope of what is minimized, but for the prior, which takes no data."""
+        albedo = albedo.reshape((1,) * (2 - albedo.ndim) + albedo.shape) / math.pi
+        matrix = make(rows)
+        error = jnp.where(weights[:, None] > 0, observed - albedo * matmul(matrix, light.T), 0)
+        return matmul((albedo * weights[:, None] ** 2 * error).T, matrix) / scale**2
+
+    @jax.custom_jvp
+    def attached(light, inverse, pull, scale, *data):
+        return light
+
+    @attached.defjvp
+    def _(primals, tangents):
+        light, inverse, pull, scale, *data = primals
+        follow = functools.partial(slope, light, pull, scale)
+        _, moved = jax.jvp(follow, tuple(data), tuple(tangents[4:]))
+        inverse = jnp.where(jnp.isfinite(inverse), inverse, 0)
+        step = einsum("ckj,cj->ck", inverse, moved)
+        # The prior is relative to the mean light, which moves too (Sherman and Morrison).
+        mean = jnp.where(light[:, :1] == 0, 1, light[:, :1])
+        follows = einsum("ckj,cj->ck", inverse, -2 * pull**2 * light / mean)
+        step = step - follows * step[:, :1] / (1 + follows[:, :1])
+        return light, step
+
+    return attached
+
+
+def _whole(light, found, scale, relative, columns, degree, kind, result, statistics):
+    """The answer up to the degree that was asked for, with what was not seen at all."""
+    dtype, count = light.dtype, num_coefficients(degree)
+    columns = columns[columns < count]
+    kept = len(columns)
+    spread = jnp.full((3, count), jnp.inf, dtype)
+    if relative is not None:
+        spread = relative[None, :count] * light[:, :1] ** 2
+    variance = found.noise**2
+    inner = found.inverse[:, :kept, :kept]
+    inner = jnp.where(jnp.isfinite(inner), variance * inner, jnp.inf)
+    factor = window(kind, degree).astype(dtype)
+    value = jnp.zeros((3, count), dtype).at[:, columns].set(light[:, :kept]) * factor[None]
+    known = jnp.zeros((3, count), dtype).at[:, columns].set(found.determined[:, :kept])
+    covariance = jnp.zeros((3, count, 3, count), dtype)
+    for c in range(3):
+        block = jnp.diag(spread[c]).at[columns[:, None], columns[None]].set(inner[c])
+        covariance = covariance.at[c, :, c].set(factor[:, None] * block * factor[None])
+    covariance = covariance.reshape(3 * count, 3 * count)
+    deviation = jnp.sqrt(jnp.maximum(jnp.diagonal(covariance), 0)).reshape(3, count)
+    # As found, and not followed where the light is differentiated.
+    still = jax.lax.stop_gradient(
+        (statistics, Confidence(covariance, deviation), known, scale * found.noise)
+    )
+    return RecoveredLight(value, result, *still)

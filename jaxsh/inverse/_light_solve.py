@@ -1,0 +1,170 @@
+"""Linear least squares for a light under a prior, its noise level, and a set of inequalities.
+
+All in units in which the weighted data have length 1, on the few rows that hold all of them.
+"""
+
+import math
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import lineax as lx
+from jaxtyping import Array, Float
+
+from .._core.linalg import einsum
+from .._core.xla import on_mesh
+from ._shading import Shading, compress
+from ._solve import covariance, triangle
+
+# Rows that are made small at once: more do not fit a cache, and 10⁶ at once not the memory.
+_BLOCK = 2**14
+# How often the scale of the prior follows the mean light: each time it changes tenfold less.
+_PASSES = 8
+# Levels of noise that are tried, evenly in their logarithm, then more finely around the best.
+_LEVELS, _FINER = 193, 33
+# A channel's prior is no narrower than this part of the widest.
+_LEAST = 1e-3
+
+
+class Solution(NamedTuple):
+    """Light of each channel, and what is known of it."""
+
+    light: Float[Array, "3 k"]
+    inverse: Float[Array, "3 k k"]  # of the Hessian: covariance in the noise's variance
+    pull: Float[Array, "3 k"]  # square roots of what the prior adds to the Hessian's diagonal
+    determined: Float[Array, "3 k"]
+    noise: Float[Array, ""]
+    residual: Float[Array, ""]
+
+
+def compress_rows(observed, rows, albedo, weights, make) -> Shading:
+    """Compresses as `compress` does, for transfer `make(rows)`, in blocks that fit the memory."""
+    count = len(observed)
+    if count <= _BLOCK or on_mesh(observed, rows):
+        return compress(observed, make(rows), albedo, weights)
+
+    def cut(array):
+        padding = [(0, -count % _BLOCK)] + [(0, 0)] * (array.ndim - 1)
+        return jnp.pad(array, padding, mode="edge").reshape(-1, _BLOCK, *array.shape[1:])
+
+    each = albedo.ndim == 2
+    filled = jnp.pad(weights, (0, -count % _BLOCK)).reshape(-1, _BLOCK)
+    blocks = cut(observed), cut(rows), cut(albedo) if each else filled, filled
+
+    def one(block):
+        seen, part, reflected, trust = block
+        small = compress(seen, make(part), reflected if each else albedo, trust)
+        return small.operator, small.target * small.scale
+
+    operators, targets = jax.lax.map(one, blocks)
+    norm = jnp.linalg.norm(targets)
+    scale = jnp.where(norm > 0, norm, 1)
+    width, channels = operators.shape[-1], operators.shape[1]
+    operators = jnp.moveaxis(operators, 1, 0).reshape(channels, -1, width)
+    targets = jnp.moveaxis(targets, 1, 0).reshape(3, -1) / scale
+    columns = targets.T[None] if channels == 1 else targets[..., None]
+    small = jax.vmap(triangle)(jnp.concatenate([operators, columns], axis=-1))
+    target = jnp.moveaxis(small[..., width:], -1, 0 if channels == 1 else 1).reshape(3, -1)
+    return Shading(target, small[..., :width], scale)
+
+
+def solve_plain(
+    operator: Float[Array, "3 r k"],
+    target: Float[Array, "3 r"],
+    count: Float[Array, ""],
+    noise: Float[Array, ""] | None,
+) -> Solution:
+    """Least squares without a prior; what the data do not tell stays zero, its deviation infinite.
+
+    `count` is the number of pixels with a weight.
+    """
+    solver = lx.SVD(rcond=10 * float(jnp.finfo(target.dtype).eps) * operator.shape[-1])
+
+    def one(matrix, b):
+        return lx.linear_solve(lx.MatrixLinearOperator(matrix), b, solver).value
+
+    light = jax.vmap(one)(operator, target)
+    residual = jnp.linalg.norm(target - einsum("crk,ck->cr", operator, light))
+    free = jnp.maximum(3 * (count - operator.shape[-1]), 1)
+    noise = residual / jnp.sqrt(free) if noise is None else noise
+    unit = jnp.ones((), target.dtype)
+    inverse = jax.vmap(lambda matrix: covariance(matrix, unit))(operator)
+    known = jnp.isfinite(jnp.diagonal(inverse, axis1=1, axis2=2)).astype(target.dtype)
+    return Solution(light, inverse, jnp.zeros_like(light), known, noise, residual)
+
+
+def solve_with_prior(
+    operator: Float[Array, "3 r k"],
+    target: Float[Array, "3 r"],
+    variances: Float[Array, " k"],
+    count: Float[Array, ""],
+    noise: Float[Array, ""] | None,
+) -> Solution:
+    """Most probable light under a Gaussian prior, of `variances` in the square of the mean light.
+
+    The constant coefficient, the first, has no prior; those of the others are relative to it. The
+    level of the noise, unless known, is that under which what was observed is most probable, all
+    lights taken together (marginal likelihood; restricted, since the mean is free).
+    """
+    dtype = target.dtype
+    widths = jnp.sqrt(variances[1:])
+    # The operator is a triangle: its first row alone holds the first coefficient.
+    first, rest = operator[:, 0], operator[:, 1:, 1:] * widths[None, None]
+    u, d, vt = jnp.linalg.svd(rest, full_matrices=False)
+    y = einsum("cri,cr->ci", u, target[:, 1:])
+    across = jnp.sum((target[:, 1:] - einsum("cri,ci->cr", u, y)) ** 2)
+    free = 3 * jnp.maximum(count - 1 - d.shape[-1], 0)
+    head = jnp.where(first[:, 0] == 0, 1, first[:, 0])
+    typical = 1 / jnp.sqrt(3 * jnp.maximum(count, 1))  # root mean square of what was observed
+
+    def improbability(level, scale):
+        """-2 log of the marginal likelihood, for levels (n,)."""
+        variance = level[:, None, None] ** 2
+        total = variance + (scale[:, None] * d)[None] ** 2
+        seen = jnp.sum(jnp.log(total) + y[None] ** 2 / total, axis=(1, 2))
+        return seen + free * 2 * jnp.log(level) + across / level**2
+
+    def most_probable(scale):
+        if noise is not None:
+            return noise
+        low = math.log(10 * float(jnp.finfo(dtype).eps))
+        logs = jnp.linspace(low, 0.7, _LEVELS, dtype=dtype)
+        step = (0.7 - low) / (_LEVELS - 1)
+        best = logs[jnp.argmin(improbability(typical * jnp.exp(logs), scale))]
+        logs = best + jnp.linspace(-step, step, _FINER, dtype=dtype)
+        best = logs[jnp.argmin(improbability(typical * jnp.exp(logs), scale))]
+        return typical * jnp.exp(best)
+
+    def floor(mean):
+        return jnp.maximum(jnp.abs(mean), _LEAST * jnp.max(jnp.abs(mean)))
+
+    def follow(_, state):
+        scale, _ = state
+        level = most_probable(scale)
+        gain = scale[:, None] * d
+        pulled = gain / (gain**2 + level**2) * y
+        others = scale[:, None] * widths[None] * einsum("cik,ci->ck", vt, pulled)
+        return floor((target[:, 0] - jnp.sum(first[:, 1:] * others, axis=1)) / head), level
+
+    start = floor(target[:, 0] / head), jnp.zeros((), dtype)
+    scale, level = jax.lax.fori_loop(0, _PASSES, follow, start)
+    spreads = (scale[:, None] * widths[None]) ** 2
+    spreads = jnp.where(spreads > 0, spreads, 1)
+    pull = level / jnp.sqrt(spreads)
+    # A channel of which nothing is seen: zero, and not what a singular matrix gives.
+    dark = first[:, :1] == 0
+    pull = jnp.concatenate([dark.astype(dtype), pull], axis=1)
+    stacked = jnp.concatenate([operator, jax.vmap(jnp.diag)(pull)], axis=1)
+
+    def one(matrix, b):
+        filled = jnp.concatenate([b, jnp.zeros(matrix.shape[1], dtype)])
+        return lx.linear_solve(lx.MatrixLinearOperator(matrix), filled, lx.QR()).value
+
+    light = jax.vmap(one)(stacked, target)
+    residual = jnp.linalg.norm(target - einsum("crk,ck->cr", operator, light))
+    inverse = jax.vmap(lambda matrix: covariance(matrix, jnp.ones((), dtype)))(stacked)
+    inverse = jnp.where(dark[..., None], jnp.inf, inverse)
+    own = level**2 * jnp.diagonal(inverse, axis1=1, axis2=2)
+    known = jnp.concatenate([jnp.ones((3, 1), dtype), 1 - own[:, 1:] / spreads], axis=1)
+    known = jnp.where(dark, 0, jnp.clip(known, 0, 1))
+    return Solution(light, inverse, pull, known, level, residual)
