@@ -32,8 +32,9 @@ def dering(
 
     A truncated light rings: behind a bright source it goes below zero (Sloan 2008). What a surface
     makes of it rings less, since it sees the light convolved with its lobe: the wider the lobe, the
-    less of a window is needed, often none. Shadows undo that: an unshadowed surface without
-    negative irradiance may have some where it is shadowed.
+    less of a window is needed, often none. Where shadows cut into a lobe that no longer holds: a
+    diffuse surface is then safe under `of="light"`, and a sun is better taken out of the picture
+    before (`sphere.split_sun`). See `docs/ringing.md`.
 
     **Arguments**
 
@@ -56,6 +57,19 @@ def dering(
     kinks where the strength reaches 0, 1 or 2 or the darkest direction jumps; a second derivative
     raises `NotImplementedError`. Raises `ValueError` where K is not a square, for another `of`, for
     an exponent that is missing, not asked for or not above -1, and for one function with `shared`.
+
+    **Cost** on five light probes (grace, galileo, eucalyptus, stpeters, uffizi): mean error in % of
+    the mean, averaged over the probes, one window for the three channels; in brackets the largest
+    negative share. `python -m experiments run ringing --preset paper` prints it, and more.
+
+    | made of the light | degree | no window | `"lanczos"` | `"hann"` | `dering` of it |
+    |---|---|---|---|---|---|
+    | irradiance | 2 | 2.9 | 12.8 | 17.2 | 3.0 |
+    | irradiance | 6 | 0.6 | 3.0 | 4.3 | 0.6 |
+    | lobe, k = 8 | 2 | 37.6 (8.0) | 39.4 (0.2) | 44.5 (0.1) | 38.5 |
+    | lobe, k = 8 | 6 | 2.0 | 12.3 | 16.7 | 2.9 |
+    | lobe, k = 32 | 6 | 31.0 (6.4) | 34.7 (0.1) | 41.3 (0.1) | 36.0 |
+    | lobe, k = 32 | 10 | 8.7 (0.6) | 18.4 | 24.2 | 12.9 |
 
     **Example**
 

@@ -31,7 +31,7 @@ def window(
       the others do not promise.
 
     The stronger the window, the less ringing and the more blur: `dering` finds the least that a
-    given light needs, and its docstring says what each costs. Raises `ValueError` for another
+    given light needs, and `docs/ringing.md` says what each costs. Raises `ValueError` for another
     kind.
 
     **Example**
