@@ -9,10 +9,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.ndimage
 from jaxtyping import Bool, Float, Int
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ._quadrature import fejer_weights
 
@@ -87,9 +84,11 @@ class Coarse(NamedTuple):
 
 def grown(mask: Bool[np.ndarray, "h w"], reach: int) -> Bool[np.ndarray, "h w"]:
     """Cells of a mask and all that are up to `reach` cells away from it, on the sphere."""
+    from scipy import ndimage  # only splitting a sun needs it, and `import jaxsh.sphere` is light
+
     for _ in range(reach):
         wrapped = np.concatenate([mask[:, -1:], mask, mask[:, :1]], axis=1)
-        mask = scipy.ndimage.binary_dilation(wrapped, _EIGHT)[:, 1:-1]
+        mask = ndimage.binary_dilation(wrapped, _EIGHT)[:, 1:-1]
         for pole in (0, -1):
             mask[pole] |= mask[pole].any()
     return mask
@@ -101,7 +100,10 @@ def _edges(count: int, block: int) -> Int[np.ndarray, " n"]:
 
 def _label(mask: Bool[np.ndarray, "h w"]) -> tuple[Int[np.ndarray, "h w"], int]:
     """Number the connected cells of a mask from 1, across the seam and the poles too."""
-    numbered: Any = scipy.ndimage.label(mask, _EIGHT)
+    from scipy import ndimage
+    from scipy.sparse import coo_array, csgraph
+
+    numbered: Any = ndimage.label(mask, _EIGHT)
     labels, count = numbered
     first, last = labels[:, 0], labels[:, -1]
     pairs = [np.stack([last, np.roll(first, shift)]) for shift in (-1, 0, 1)]
@@ -113,6 +115,6 @@ def _label(mask: Bool[np.ndarray, "h w"]) -> tuple[Int[np.ndarray, "h w"], int]:
     a, b = np.concatenate(pairs, axis=1)
     both = (a > 0) & (b > 0)
     links = coo_array((np.ones(both.sum()), (a[both], b[both])), shape=(count + 1, count + 1))
-    joined, number = connected_components(links, directed=False)
+    joined, number = csgraph.connected_components(links, directed=False)
     # Number 0 is the background's, which has no link.
     return number[labels], joined - 1
