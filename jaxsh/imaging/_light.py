@@ -82,7 +82,8 @@ def read_light(
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such light")
     try:
-        return _in_ours(read_stored(path, which), convention, up)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is infinite is met as such
+            return _in_ours(read_stored(path, which), convention, up)
     except MemoryError as error:
         raise ValueError(f"{path}: damaged, or too large for memory") from error
     except ValueError as error:
@@ -157,9 +158,8 @@ def _floats(values: np.ndarray) -> Float[np.ndarray, "..."]:
         raise ValueError(f"expected real numbers, got dtype {kind} and shape {values.shape}")
     if bad := int((~np.isfinite(values)).sum()):
         raise ValueError(f"{bad} of its {values.size} numbers are NaN or infinite")
-    with np.errstate(over="ignore"):
-        values = values.astype(np.float32 if kind.kind == "f" and kind.itemsize < 8 else np.float64)
-        return values.astype(jnp.result_type(float)) if kind.itemsize > 4 else values
+    values = values.astype(np.float32 if kind.kind == "f" and kind.itemsize < 8 else np.float64)
+    return values.astype(jnp.result_type(float)) if kind.itemsize > 4 else values
 
 
 def write_light(

@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -134,18 +133,14 @@ def read_splats(path: str | os.PathLike[str], *, up: Literal["z", "y", "-y"] = "
         raise FileNotFoundError(f"{path}: there is no such file of splats")
     try:
         arrays, ignored = read_splat_arrays(path.read_bytes())
-        arrays = _turned(arrays, up)
+        arrays = _turned(_in_jax_types(arrays), up)
     except MemoryError as error:
         raise ValueError(f"{path}: damaged, or too large for memory") from error
     except ValueError as error:
         raise ValueError(f"{path}: {reason(error, 350)}") from error
     if ignored:
         warnings.warn(f"{path}: {reason(ignored, 600)}", stacklevel=2)
-    return Splats(
-        jnp.asarray(_in_jax_type(arrays.positions)),
-        jnp.asarray(_in_jax_type(arrays.coefficients)),
-        *(None if one is None else jnp.asarray(_in_jax_type(one)) for one in arrays[2:]),
-    )
+    return Splats(**arrays._asdict())
 
 
 def write_splats(
@@ -193,6 +188,19 @@ def write_splats(
     check_place(path)
     put_in_place({path: lambda file: put_splats(file, _turned(arrays, up, back=True))})
     return path
+
+
+def _in_jax_types(arrays: SplatArrays) -> SplatArrays:
+    """Cast to what JAX has, and check once more: float32 cannot hold all that float64 can."""
+    with np.errstate(over="ignore"):
+        cast: dict[str, Any] = {
+            name: None if one is None else _in_jax_type(one)
+            for name, one in arrays._asdict().items()
+        }
+        arrays = SplatArrays(**cast)
+    if problem := splats_problem(arrays):
+        raise ValueError(problem)
+    return arrays
 
 
 def _in_jax_type(array: np.ndarray) -> np.ndarray:

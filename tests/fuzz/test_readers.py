@@ -85,7 +85,10 @@ def test_changed_files_are_read_or_refused(tmp_path, kind):
     path = tmp_path / f"changed.{kind}"
     put_beside(path)
 
-    @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+    @settings(
+        max_examples=20 if kind in LIGHTS else 50,
+        suppress_health_check=[HealthCheck.function_scoped_fixture],
+    )
     @given(which=st.integers(0, len(seeds(kind)) - 1), rng=st.randoms(use_true_random=False))
     def run(which, rng):
         path.write_bytes(change(kind, seeds(kind)[which], rng))

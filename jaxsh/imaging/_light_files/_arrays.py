@@ -32,10 +32,10 @@ def read_npz(path: Path, which: str | int | None) -> Stored:
     """
     try:
         names = npz_names(path)
-        said = from_npz(path, _SAID)
+        # A text of any bytes may be none.
+        words = {name: str(array) for name, array in from_npz(path, _SAID).items()}
     except Exception as error:  # a damaged archive may raise anything
         raise ValueError(f"damaged: {reason(error)}") from error
-    words = {name: str(array) for name, array in said.items() if not array.shape}
     kind, version = words.get("format", _FORMAT), words.get("version", str(_VERSION))
     if kind != _FORMAT or (version != str(_VERSION) and "format" in words):
         raise ValueError(

@@ -53,8 +53,6 @@ def read_splat_arrays(data: bytes) -> tuple[SplatArrays, str]:
         _stacked(columns, scales) if scales else None,
         _stacked(columns, rotations) if rotations else None,
     )
-    if problem := _not_finite(arrays):
-        raise ValueError(problem)
     found += _ignored(columns, used)
     found += [f"{one.rows} elements {one.name!r} ignored" for one in header.elements
               if one.name != "vertex" and one.rows]  # fmt: skip
