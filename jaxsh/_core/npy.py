@@ -2,6 +2,7 @@
 
 import io
 import math
+import sys
 import warnings
 import zipfile
 from collections.abc import Iterable
@@ -88,3 +89,15 @@ def from_npz(path: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
         if size > 10 * held + _ROOM:
             raise ValueError(f"it unpacks to {size} bytes out of {held}, which is not plausible")
         return {name: from_npy(archive.read(file)) for name, file in stored.items()}
+
+
+def text_of(array: np.ndarray) -> str:
+    """Print an array; raises `ValueError` for text that is none, of which NumPy makes a string.
+
+    Such a string is an error of the interpreter wherever it is looked at.
+    """
+    if array.dtype.kind == "U" and array.dtype.itemsize:
+        codes = np.frombuffer(array.tobytes(), np.dtype("u4").newbyteorder(array.dtype.byteorder))
+        if codes.max(initial=0) > sys.maxunicode:
+            raise ValueError("its text is none")
+    return str(array)

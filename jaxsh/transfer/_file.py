@@ -10,12 +10,13 @@ import numpy as np
 
 from .._core.checks import as_path, check_type
 from .._core.files import check_place, put_in_place
-from .._core.npy import from_npz
+from .._core.npy import from_npz, text_of
 from .._core.words import reason
 from ..harmonics import degree_of
 from ._transfer import Transfer
 
 _FORMAT, _VERSION = "jaxsh transfer", 1
+_NONE = np.array(0)
 _FIELDS = {"coefficients": "f", "positions": "f", "normals": "f", "neighbors": "i"}
 
 
@@ -72,13 +73,13 @@ def load(path: str | os.PathLike[str]) -> Transfer:
         raise ValueError(f"{path}: not a transfer file, or a truncated one")
     try:
         arrays = from_npz(path, ["format", "version", *_FIELDS])
+        kind, version = text_of(arrays.pop("format", _NONE)), arrays.pop("version", _NONE)
+        written = reason(text_of(version), 40)
     except Exception as error:  # a damaged archive may raise anything
         raise ValueError(f"{path}: damaged: {reason(error)}") from error
-    if str(arrays.pop("format", None)) != _FORMAT:
+    if kind != _FORMAT:
         raise ValueError(f"{path}: not a transfer file")
-    version = arrays.pop("version", np.array(0))
     if version.shape or version.dtype.kind != "i" or version != _VERSION:
-        written = reason(str(version), 40)
         raise ValueError(f"{path}: written as version {written}, but this jaxsh reads {_VERSION}")
     # As read, and once more in JAX's types: float32 cannot hold all that float64 can.
     for change in (lambda array: array, _in_jax_types):

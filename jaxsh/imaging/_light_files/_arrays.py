@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..._core.json_fields import parse_object
-from ..._core.npy import from_npy, from_npz, npz_names
+from ..._core.npy import from_npy, from_npz, npz_names, text_of
 from ..._core.words import reason
 from ...harmonics import Convention, conventions
 from ._stored import Stored, choose
@@ -32,8 +32,7 @@ def read_npz(path: Path, which: str | int | None) -> Stored:
     """
     try:
         names = npz_names(path)
-        # A text of any bytes may be none.
-        words = {name: str(array) for name, array in from_npz(path, _SAID).items()}
+        words = {name: text_of(array) for name, array in from_npz(path, _SAID).items()}
     except Exception as error:  # a damaged archive may raise anything
         raise ValueError(f"damaged: {reason(error)}") from error
     kind, version = words.get("format", _FORMAT), words.get("version", str(_VERSION))
