@@ -98,11 +98,6 @@ def shade_sun(
     check_suns(suns)
     positions, normals = points_of(surface)
     count, dtype = len(positions), positions.dtype
-    if (albedo is None) == (material is None):
-        raise ValueError(
-            "expected albedo, of a diffuse surface, or material, of a glossy one, got "
-            f"{'neither' if albedo is None else 'both'}"
-        )
     if (eye is None) != (material is None):
         raise ValueError(
             "a material needs the eye that looks at it, which eye=None does not say"
@@ -111,13 +106,22 @@ def shade_sun(
         )
     shadows, distant = check_flag("shadows", shadows), check_flag("distant", distant)
     normalized = check_flag("normalized", normalized)
-    if material is None and albedo is not None:
-        material = Material(checked_albedo(albedo, count, dtype), 0.0, 1.0)
-    material = checked_material(material, count, dtype)
+    given = checked_material(_material(albedo, material, count, dtype), count, dtype)
     eye = None if eye is None else checked_eye(eye, dtype)
     visibility = _visibility(suns, surface, scene, shadows, count)
     return _shade_sun(
-        suns, positions, normals, visibility, material, eye, distant=distant, normalized=normalized
+        suns, positions, normals, visibility, given, eye, distant=distant, normalized=normalized
+    )
+
+
+def _material(albedo, material: Material | None, count: int, dtype) -> Material:
+    if material is not None and albedo is None:
+        return material
+    if material is None and albedo is not None:
+        return Material(checked_albedo(albedo, count, dtype), 0.0, 1.0)
+    raise ValueError(
+        "expected albedo, of a diffuse surface, or material, of a glossy one, got "
+        f"{'neither' if albedo is None else 'both'}"
     )
 
 
