@@ -1,5 +1,6 @@
 """The bakes of `first_light`: what they take beside their rays alone, and how exact they are."""
 
+import dataclasses
 import functools
 import itertools
 import math
@@ -27,6 +28,12 @@ class Subject(NamedTuple):
     mesh: geometry.Mesh
     transfers: dict[str, transfer.Transfer]
     chosen: Int[np.ndarray, " n"]
+
+
+def bounces_alone(bounced: transfer.Transfer, direct: transfer.Transfer) -> transfer.Transfer:
+    """What of a transfer arrives by way of the surface: exact, for equal rays cancel."""
+    indirect = bounced.coefficients - direct.coefficients
+    return dataclasses.replace(bounced, coefficients=indirect)
 
 
 class _Recorder:

@@ -8,30 +8,32 @@ and against paths where light bounces.
 import dataclasses
 import functools
 import statistics
+import warnings
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxsh import harmonics, imaging, sphere, transfer
+from jaxsh import geometry, harmonics, imaging, sphere, transfer
 
 from ..runner import Column, Context, Table, experiment
-from .bake import OFFSET, Subject, bake, relative_error
+from .bake import OFFSET, Subject, bake, bounces_alone, relative_error
 from .pictures import Picture, draw_errors, draw_sheet, draw_variants
 from .reference import Estimate, irradiance
-from .still import draw_still, softened
+from .still import draw_still
 
-_STILL = "copper on paper: shadows and a bounce in transfer of degree 10, a glossy lobe, one light"
-_SHEET = (
-    "shadowed, with a bounce, at the highest degree, before each probe, whose light is softened"
+_STILL = (
+    "copper on paper: sun and lamp split off the probe and shaded by rays, the rest by transfer of "
+    "degree 10, with a bounce and a glossy lobe"
 )
+_SHEET = "shadowed, with a bounce, at the highest degree, before each probe, its suns split off"
 _VARIANTS = (
-    "the three variants, what shadows take and what the bounce adds, in softened light. Last, the "
-    "light as it is, cut off at the highest degree: dark bands along a shadow's edge are its "
-    "ringing below zero, which the errors measure"
+    "the three variants, what shadows take and what the bounce adds, suns split off. Last, all of "
+    "the light by harmonics, cut off at the highest degree: dark bands along a shadow's edge are "
+    "their ringing below zero"
 )
 _WIDTH = 0.8  # of a picture, in its heights
 
@@ -46,6 +48,10 @@ class FirstLight:
     """degrees of light and transfer"""
     directions: int = 2048
     """directions of the bake"""
+    suns: int = 8
+    """how many bright sources are split off a probe at most"""
+    rays: int = 64
+    """from a vertex to each of them"""
     albedo: float = 0.5
     """of the surface, where it is shaded and where light bounces"""
     vertices: int = 2000
@@ -64,7 +70,7 @@ class FirstLight:
     def __post_init__(self):
         if not self.degrees or min(self.degrees) < 0:
             raise ValueError("degrees must be one or more numbers >= 0")
-        for name in ("directions", "vertices", "paths", "samples"):
+        for name in ("suns", "rays", "directions", "vertices", "paths", "samples"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         if self.transfer_directions < 2:
@@ -86,7 +92,9 @@ def run(config: FirstLight, context: Context) -> list[Table]:
         name: context.data.environment(name)
         for name in config.environments or context.data.environments()
     }
-    lights = {name: _project(context, name, degree, environments[name]) for name in environments}
+    lights = {
+        name: _project(config, context, name, degree, environments[name]) for name in environments
+    }
     pictures: list[list[Picture]] = []
     for name in context.progress(config.meshes or context.data.meshes()[:1], "meshes"):
         subject = bake(
@@ -98,7 +106,9 @@ def run(config: FirstLight, context: Context) -> list[Table]:
             chosen=config.vertices,
             transfer_directions=config.transfer_directions,
         )
-        pictures.append(_draw(config, context, subject, environments, lights))
+        with context.time(f"{name}: suns"):
+            sunlit = {key: _sunlit(config, subject, lights[key]) for key in lights}
+        pictures.append(_draw(config, context, subject, environments, lights, sunlit))
         with context.time(f"{name}: reference"):
             references = irradiance(
                 subject.mesh,
@@ -110,8 +120,8 @@ def run(config: FirstLight, context: Context) -> list[Table]:
                 context=context,
             )
         for picture in pictures[-1]:
-            light, reference = lights[picture.environment], references[picture.environment]
-            for row in _errors(config, subject, light, reference, picture):
+            key = picture.environment
+            for row in _errors(config, subject, lights[key], sunlit[key], references[key], picture):
                 context.record(row)
     if config.still:
         with context.time("still"):
@@ -124,11 +134,38 @@ def run(config: FirstLight, context: Context) -> list[Table]:
     return list(_tables(config, context))
 
 
+class Light(NamedTuple):
+    """A probe's light: whole, and without the suns that were split off."""
+
+    whole: Float[Array, "3 k"]
+    rest: Float[Array, "3 k"]
+    suns: sphere.Suns
+
+
 def _project(
-    context: Context, name: str, degree: int, environment: Float[Array, "h w 3"]
-) -> Float[Array, "3 k"]:
+    config: FirstLight, context: Context, name: str, degree: int, environment: Float[Array, "h w 3"]
+) -> Light:
     project = jax.jit(functools.partial(sphere.project_lat_long, degree=degree))
-    return context.measure(f"project {name}", project, environment).value
+    whole = context.measure(f"project {name}", project, environment).value
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # a probe without any has none in the table
+        suns, rest = sphere.split_sun(environment, config.suns, rays=config.rays)
+    return Light(whole, project(rest), suns)
+
+
+def _sunlit(config: FirstLight, subject: Subject, light: Light) -> dict[str, Float[Array, "v 3"]]:
+    """What the suns send to all vertices directly, by variant."""
+    scene = geometry.ray_scene(subject.mesh)
+    seen = transfer.sun_visibility(
+        light.suns, subject.mesh, scene, rays=config.rays, ray_bias=OFFSET
+    )
+    shade = functools.partial(transfer.shade_sun, light.suns, subject.mesh, albedo=config.albedo)
+    shadowed = shade(seen)
+    return {
+        "unshadowed": shade(shadows=False),
+        "shadowed": shadowed,
+        "one bounce": shadowed,
+    }
 
 
 def _draw(
@@ -136,24 +173,23 @@ def _draw(
     context: Context,
     subject: Subject,
     environments: dict[str, Array],
-    lights: dict[str, Array],
+    lights: dict[str, Light],
+    sunlit: dict[str, dict[str, Array]],
 ) -> list[Picture]:
-    """Draw each variant at the highest degree under each environment, softened."""
+    """Draw each variant at the highest degree under each environment, its suns split off."""
     width = round(_WIDTH * config.size)
     camera = imaging.Camera.facing(subject.mesh, width=width, height=config.size)
     with context.time(f"{subject.name}: raster"):
         raster = imaging.rasterize(subject.mesh, camera, samples=config.samples)
     pictures = []
     for name, environment in environments.items():
-        renders = {
-            variant: imaging.interpolate(raster, shaded)
-            for variant, shaded in _radiance(config, subject, softened(lights[name])).items()
-        }
-        ringing = imaging.interpolate(raster, _radiance(config, subject, lights[name])["shadowed"])
-        exposure = float(imaging.auto_exposure(ringing, raster.mask))
+        light, degree = lights[name], max(config.degrees)
+        shaded = _radiance_split(config, subject, light, sunlit[name], degree)
+        shaded["ringing"] = _radiance(config, subject, light.whole)["shadowed"]
+        renders = {variant: imaging.interpolate(raster, each) for variant, each in shaded.items()}
+        exposure = float(imaging.auto_exposure(renders["ringing"], raster.mask))
         background = np.asarray(imaging.backdrop(environment, camera))
         alpha = np.asarray(raster.alpha)[..., None]
-        renders["ringing"] = ringing
         arrays = {variant: np.asarray(render) for variant, render in renders.items()}
         pictures.append(Picture(subject.name, name, arrays, background, alpha, exposure))
     return pictures
@@ -168,34 +204,59 @@ def _radiance(
     }
 
 
+def _radiance_split(
+    config: FirstLight,
+    subject: Subject,
+    light: Light,
+    sunlit: dict[str, Float[Array, "v 3"]],
+    degree: int,
+) -> dict[str, Float[Array, "v 3"]]:
+    """The rest and what bounces of the suns by harmonics, the suns' direct light by rays."""
+    rest = light.rest[:, : harmonics.num_coefficients(degree)]
+    shaded = _radiance(config, subject, rest)
+    shaded = {variant: radiance + sunlit[variant] for variant, radiance in shaded.items()}
+    bounces = bounces_alone(subject.transfers["one bounce"], subject.transfers["shadowed"])
+    indirect = transfer.shade_diffuse(light.suns.harmonics(degree), bounces, config.albedo)
+    shaded["one bounce"] += indirect
+    return shaded
+
+
 def _errors(
     config: FirstLight,
     subject: Subject,
-    light: Float[Array, "3 k"],
+    light: Light,
+    sunlit: dict[str, Float[Array, "v 3"]],
     reference: dict[str, Estimate],
     picture: Picture,
 ) -> Iterator[dict[str, Any]]:
-    """One row by degree and variant: its error against each reference, and PSNR of its own."""
+    """One row by degree and variant: its errors, and PSNR, without and with the suns split off."""
     reflectance = config.albedo / np.pi
     for degree in config.degrees:
-        shaded = _radiance(config, subject, light[:, : harmonics.num_coefficients(degree)])
-        for variant, radiance in shaded.items():
-            got = np.asarray(radiance)[subject.chosen] / reflectance
-            exposed, exact = (
-                jnp.clip(picture.exposure * reflectance * jnp.asarray(x)[None], 0, 1)
-                for x in (got, reference[variant].value.astype(got.dtype))
-            )
-            yield {
+        cut = light.whole[:, : harmonics.num_coefficients(degree)]
+        shaded = _radiance(config, subject, cut)
+        split = _radiance_split(config, subject, light, sunlit, degree)
+        for variant in shaded:
+            row = {
                 "mesh": subject.name,
                 "environment": picture.environment,
                 "degree": degree,
                 "variant": variant,
-                "error": relative_error(got, reference[variant].value),
-                "error_to_shadowed": relative_error(got, reference["shadowed"].value),
-                "error_to_one_bounce": relative_error(got, reference["one bounce"].value),
-                "psnr": float(imaging.psnr(exposed, exact)),
+                "suns": len(light.suns.solid_angle),
                 "reference_error": 100 * reference[variant].error,
             }
+            for ending, radiance in (("", shaded[variant]), ("_split", split[variant])):
+                got = np.asarray(radiance)[subject.chosen] / reflectance
+                exposed, exact = (
+                    jnp.clip(picture.exposure * reflectance * jnp.asarray(x)[None], 0, 1)
+                    for x in (got, reference[variant].value.astype(got.dtype))
+                )
+                row[f"error{ending}"] = relative_error(got, reference[variant].value)
+                row[f"psnr{ending}"] = float(imaging.psnr(exposed, exact))
+                if not ending:
+                    for other in ("shadowed", "one bounce"):
+                        error = relative_error(got, reference[other].value)
+                        row[f"error_to_{other.replace(' ', '_')}"] = error
+            yield row
 
 
 def _tables(config: FirstLight, context: Context) -> Iterator[Table]:
@@ -232,14 +293,23 @@ def _by_degree(config: FirstLight, errors: list[dict[str, Any]]) -> Table:
     for row in errors:
         key = tuple(row[name] for name in ("mesh", "environment", "variant"))
         line = rows.setdefault(key, {k: row[k] for k in ("mesh", "environment", "variant")})
-        line[f"error {row['degree']}"] = row["error"]
-        line[f"psnr {row['degree']}"] = row["psnr"]
-        line["reference"] = row["reference_error"]
+        line["suns"], line["reference"] = row["suns"], row["reference_error"]
+        for key in ("error", "psnr", "error_split", "psnr_split"):
+            line[f"{key} {row['degree']}"] = row[key]
     columns = [
         *(Column(name, name) for name in ("mesh", "environment", "variant")),
         *(Column(f"error {d}", f"degree {d}: error, %", digits=2) for d in config.degrees),
+        Column("suns", "suns split off", digits=0),
+        *(
+            Column(f"error_split {d}", f"degree {d} with suns split: error, %", digits=2)
+            for d in config.degrees
+        ),
         Column("reference", "reference's own, %", digits=2),
         *(Column(f"psnr {d}", f"degree {d}: PSNR, dB", digits=1) for d in config.degrees),
+        *(
+            Column(f"psnr_split {d}", f"degree {d} with suns split: PSNR, dB", digits=1)
+            for d in config.degrees
+        ),
     ]
     return Table("Irradiance by degree", columns, list(rows.values()))
 
@@ -265,7 +335,7 @@ def _times(config: FirstLight, context: Context, bakes: list[dict[str, Any]]) ->
     for row in bakes:
         stages = {
             stage: context.times[f"{row['mesh']}: {stage}"]["seconds"]
-            for stage in ("raster", "reference")
+            for stage in ("suns", "raster", "reference")
         }
         rows.append(row | stages | {"rays": row["rays"] / 1e6})
     projections = [

@@ -14,7 +14,12 @@ from jaxsh import imaging
 
 from ..shared.plots import Panel, curve, draw_panels, plain_numbers, plt, save
 
-_STYLES: dict[str, LineStyleType] = {"unshadowed": ":", "shadowed": "-"}
+# By variant and by what of a row.
+_STYLES: dict[tuple[str, str], LineStyleType] = {
+    ("unshadowed", "error"): ":",
+    ("shadowed", "error"): "-",
+    ("shadowed", "error_split"): "--",
+}
 _DIMMED = 0.25  # the environment behind the object, so that the object stands out
 
 
@@ -69,7 +74,7 @@ def draw_variants(path: Path, pictures: list[Picture], gain: float = 4) -> None:
         "one bounce",
         "taken by shadows",
         f"added by the bounce, × {gain:g}",
-        "shadowed, not softened",
+        "shadowed, all by harmonics",
     ]
     _draw_cells(path, cells, titles)
 
@@ -95,9 +100,9 @@ def draw_errors(path: Path, rows: list[dict[str, Any]]) -> None:
     )
     for axis, mesh in zip(axes[0], meshes, strict=True):
         for number, environment in enumerate(environments):
-            for variant, style in _STYLES.items():
+            for (variant, error), style in _STYLES.items():
                 about = {"mesh": mesh, "environment": environment, "variant": variant}
-                line = curve(rows, "degree", "error", **about)
+                line = curve(rows, "degree", error, **about)
                 axis.plot(*line, style, color=f"C{number}", marker=".")
         axis.set_yscale("log")
         plain_numbers(axis.yaxis)
@@ -110,5 +115,6 @@ def draw_errors(path: Path, rows: list[dict[str, Any]]) -> None:
         *(Line2D([], [], color=f"C{i}", marker=".") for i in range(len(environments))),
         *(Line2D([], [], color="grey", linestyle=style) for style in _STYLES.values()),
     ]
-    figure.legend(handles, [*environments, *_STYLES], loc="outside right center", frameon=False)
+    styles = ["unshadowed", "shadowed", "shadowed, suns split"]
+    figure.legend(handles, [*environments, *styles], loc="outside right center", frameon=False)
     save(figure, path, dpi=110)

@@ -7,44 +7,43 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from jaxsh import geometry, harmonics, imaging, sphere, transfer
+from jaxsh import geometry, imaging, sphere, transfer
 
 from ..shared.plots import plt
+from .bake import bounces_alone
 
 _DEGREE = 10
-_SOFTNESS = 0.22  # radians that the light is blurred by in the pictures
+_SUNS, _RAYS = 2, 64  # split off the probe, and rays to each of them from a vertex
 _GAP = 0.012  # between knot and ground, so that the ground below still sees out
 _COPPER = {"diffuse": (0.30, 0.055, 0.03), "specular": (0.22, 0.20, 0.18), "exponent": 24.0}
 _PAPER = {"diffuse": (0.42, 0.42, 0.44), "specular": (0.0, 0.0, 0.0), "exponent": 4.0}
 _BOUNCED = 0.3, 0.5  # albedo of knot and sweep, where light bounces
 
 
-def softened(light: Float[Array, "c k"]) -> Float[Array, "c k"]:
-    """Blur a light by a Gaussian, as through a diffuser: it no longer rings below zero.
+def draw_still(path: Path, *, height: int, vertices: int = 40_000, directions: int = 768) -> None:
+    """Bake the scene, shade it, and write the picture, 1.5 times as wide as high.
 
-    Cut off at a degree, a small bright source is surrounded by rings of negative light, which
-    shadows cut out of their balance and show as black bands.
+    What the sun sends is sharp, and shaded by rays; what is left of the light, and what the sun's
+    light does after a bounce, is soft, and shaded by coefficients.
     """
-    l = harmonics.degrees(harmonics.degree_of(light.shape[-1]))
-    return light * jnp.asarray(np.exp(-0.5 * _SOFTNESS**2 * l * (l + 1)), light.dtype)[None]
-
-
-def draw_still(path: Path, *, height: int, vertices: int = 20_000, directions: int = 2048) -> None:
-    """Bake the scene, shade it, and write the picture, 1.5 times as wide as high."""
     knot = geometry.knot(vertices)
-    mesh = _on_a_sweep(knot, rows=max(12, round(150 * (vertices / 20_000) ** 0.5)))
+    mesh = _on_a_sweep(knot, rows=max(12, round(150 * (vertices / 40_000) ** 0.5)))
     is_knot = np.arange(len(mesh.vertices)) < len(knot.vertices)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # a vertex that the knot covers sees nothing
-        baked = transfer.bake(
-            mesh,
-            _DEGREE,
-            directions=directions,
-            bounces=1,
-            albedo=np.where(is_knot, *_BOUNCED).astype(np.float32),
-            progress=False,
+        direct, bounced = (
+            transfer.bake(
+                mesh,
+                _DEGREE,
+                directions=directions,
+                bounces=bounces,
+                albedo=np.where(is_knot, *_BOUNCED).astype(np.float32),
+                progress=False,
+            )
+            for bounces in (0, 1)
         )
-    light = softened(sphere.project_lat_long(imaging.studio(), _DEGREE))
+    suns, rest = sphere.split_sun(imaging.studio(), _SUNS, rays=_RAYS)
+    light = sphere.project_lat_long(rest, _DEGREE)
     camera = imaging.Camera(
         position=(0.35, -4.6, 1.15),
         target=(0.0, 0.0, -0.08),
@@ -57,11 +56,18 @@ def draw_still(path: Path, *, height: int, vertices: int = 20_000, directions: i
         specular=_each(is_knot, "specular"),
         exponent=_each(is_knot, "exponent")[:, 0],
     )
-    radiance = transfer.fixed_view(baked, camera.position, material)(light)
+    seen = transfer.sun_visibility(suns, mesh, rays=_RAYS)
+    radiance = (
+        transfer.shade_glossy(light, bounced, camera.position, material)
+        + transfer.shade_sun(suns, mesh, seen, material=material, eye=camera.position)
+        + transfer.shade_glossy(
+            suns.harmonics(_DEGREE), bounces_alone(bounced, direct), camera.position, material
+        )
+    )
     raster = imaging.rasterize(mesh, camera, samples=4)
     image = imaging.interpolate(raster, radiance)
     exposure = 1.35 * imaging.auto_exposure(image)
-    plt.imsave(path, np.asarray(imaging.tone_map(image, exposure, curve="reinhard", white=1.7)))
+    plt.imsave(path, np.asarray(imaging.tone_map(image, exposure, curve="reinhard", white=2.2)))
 
 
 def _each(is_knot: Bool[np.ndarray, " v"], name: str) -> Float[Array, "v c"]:
