@@ -1,4 +1,4 @@
-"""Open a glTF file: its chunks, its JSON, what it requires, and its buffers."""
+"""Open a glTF file: its chunks, its JSON, what it requires, and its buffers; and close a GLB."""
 
 import base64
 import binascii
@@ -239,3 +239,17 @@ def _data_uri(uri: str, owner: str) -> bytes:
         return base64.b64decode(plain + "=" * (-len(plain) % 4), validate=True)
     except (binascii.Error, ValueError) as error:
         raise ValueError(f"{owner} has a damaged data URI: {error}") from None
+
+
+def glb(text: bytes, data: bytes | bytearray) -> bytes:
+    """Put JSON and a buffer into the chunks of a GLB."""
+    text += b" " * (-len(text) % 4)
+    data = bytes(data) + bytes(-len(data) % 4)
+    size = 12 + 8 + len(text) + 8 + len(data)
+    return (
+        struct.pack("<4sII", b"glTF", 2, size)
+        + struct.pack("<I4s", len(text), b"JSON")
+        + text
+        + struct.pack("<I4s", len(data), b"BIN\0")
+        + data
+    )

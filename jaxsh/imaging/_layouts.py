@@ -52,6 +52,13 @@ class Tiles(NamedTuple):
     locate: Callable[[np.ndarray, np.ndarray, np.ndarray], Places]
 
 
+def face_directions(size: int) -> Float[np.ndarray, "6 size size 3"]:
+    """Locate the pixels of six faces, along x, y and z of their table, at any length."""
+    at = ((2 * np.arange(size) + 1) / size - 1)[:, None]
+    along, right, down = _FACES.swapaxes(0, 1)[:, :, None, None].astype(np.float64)
+    return along + at * right + at[:, None] * down
+
+
 def check_shape(layout: str, height: int, width: int) -> None:
     """Refuse a picture that cannot be of that layout, and name the layout that it could be."""
     if _fits(layout, height, width):

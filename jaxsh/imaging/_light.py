@@ -22,11 +22,28 @@ from .._core.checks import (
 from .._core.files import Content, check_place, put_in_place
 from .._core.words import reason
 from ..harmonics import Convention, conventions, convert, rotate
-from ._light_files import FORMATS, SAYS, Stored, cmgen_file, npz_file, read_stored, three_file
+from ._light_files import (
+    FORMATS,
+    SAYS,
+    Stored,
+    cmgen_file,
+    gltf_file,
+    lands,
+    npz_file,
+    read_stored,
+    three_file,
+)
 
 _OWN = "jaxsh"
 # What a format is written in: its own conventions, or, of arrays, any.
-_SAID = {".json": ("three.js",), ".txt": tuple(SAYS), ".npz": (), ".npy": ()}
+_SAID = {
+    ".json": ("three.js",),
+    ".txt": tuple(SAYS),
+    ".gltf": ("gltf",),
+    ".glb": ("gltf",),
+    ".npz": (),
+    ".npy": (),
+}
 _ELSEWHERE = {".ply": "splats are read by imaging.read_splats"}
 
 
@@ -145,9 +162,8 @@ def _in_ours(
         raise ValueError(f"its numbers are beyond the range of {light.dtype}")
     if stored.rotation is None:
         return jnp.asarray(light)
-    # The rows are where the file's x, y and z land in ours.
-    lands = np.array([[int(end[0] + "1") * (end[1] == one) for one in "xyz"] for end in facts.axes])
-    rotation = lands.T @ stored.rotation @ lands
+    axes = lands(facts)
+    rotation = axes.T @ stored.rotation @ axes
     return rotate(light, rotation.astype(light.dtype))
 
 
@@ -174,11 +190,14 @@ def write_light(
     - `.json`: a LightProbe for three.js' ObjectLoader.
     - `.txt`: as Filament's cmgen prints it, "filament" (pre-scaled irradiance, its `sh.txt`)
       unless `convention` is "filament-sh" or "filament-irradiance".
+    - `.gltf`, `.glb`: a scene with the light of EXT_lights_image_based alone. The extension wants
+      pictures for reflections as well: six small ones show the light itself.
     - `.npz`: an array "coefficients", in any convention, with the convention's name and facts, so
       that `read_light` needs no more; any batch in front. Without conversion to the last bit.
     - `.npy`: the same array alone. `read_light` has to be told its convention.
 
-    `.json` and sh.txt end at degree 2: what is above is left out, with a `UserWarning`.
+    `.json`, `.gltf`, `.glb` and sh.txt end at degree 2: what is above is left out, with a
+    `UserWarning`.
 
     **Arguments**
 
@@ -210,8 +229,6 @@ def write_light(
         raise ValueError(f"expected light (..., 3, K), got shape {light.shape}")
     suffix = path.suffix.lower()
     _check_suffix(path, "write")
-    if suffix in (".gltf", ".glb"):
-        raise ValueError(f"{path}: cannot write {suffix}, whose lights need pictures as well")
     said = _SAID[suffix]
     convention = convention or (said[0] if said else _OWN)
     if said and convention not in said:
@@ -221,12 +238,13 @@ def write_light(
     check_place(path)
     facts = _facts(convention, up, None)
     try:
-        values = np.asarray(convert(_fitted(light, facts.degree, bool(said)), _OWN, facts))
+        fitted = _fitted(light, facts.degree, bool(said))
+        values = np.asarray(convert(fitted, _OWN, facts))
     except ValueError as error:
         raise ValueError(f"{path}: cannot be written: {reason(error, 350)}") from error
     if not np.isfinite(values).all():
         raise ValueError(f"{path}: cannot be written: its numbers go beyond {values.dtype}")
-    put_in_place({path: _content(suffix, values, convention, facts)})
+    put_in_place({path: _content(suffix, fitted, values, convention, facts)})
     if facts.degree is not None and degree > facts.degree:
         warnings.warn(
             f"{path}: left out what is above degree {facts.degree}, the last that it holds",
@@ -236,7 +254,11 @@ def write_light(
 
 
 def _content(
-    suffix: str, values: np.ndarray, convention: str | Convention, facts: Convention
+    suffix: str,
+    light: Float[np.ndarray, "*batch 3 k"],
+    values: Float[np.ndarray, "..."],
+    convention: str | Convention,
+    facts: Convention,
 ) -> Content:
     name = convention if isinstance(convention, str) else None
     match suffix:
@@ -244,6 +266,8 @@ def _content(
             return three_file(values)
         case ".txt":
             return cmgen_file(values, str(name))
+        case ".gltf" | ".glb":
+            return gltf_file(values, light, facts, binary=suffix == ".glb")
         case ".npz":
             return npz_file(values, name, facts)
     return lambda file: np.save(file, values, allow_pickle=False)

@@ -1,6 +1,8 @@
 """Lights from files of other packages: each evaluated by the package's own function."""
 
+import base64
 import dataclasses
+import io
 import json
 import warnings
 
@@ -9,6 +11,7 @@ import light_files as files
 import numpy as np
 import pytest
 from light_files import NORMALS, THREE, THREE_IRRADIANCE
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from jaxsh import harmonics
@@ -142,11 +145,12 @@ def test_arrays_of_other_people(tmp_path, rng):
 def test_what_is_written_is_read_back(tmp_path, rng):
     light = rng.normal(size=(3, 9))
     for dtype, atol in ((np.float64, 2e-15), (np.float32, 8e-7)):
-        for name in ("a.json", "deep/er/a.txt", "a.npz"):
+        for name in ("a.json", "deep/er/a.txt", "a.npz", "a.gltf", "a.glb"):
             path = write_light(tmp_path / name, jnp.asarray(light, dtype))
             again = read_light(path)
             np.testing.assert_allclose(again, light.astype(dtype), rtol=0, atol=atol)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.json", "a.npz", "deep"]
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {"a.glb", "a.gltf", "a.json", "a.npz", "deep"}
 
 
 def test_an_archive_keeps_any_convention(tmp_path, rng):
@@ -179,10 +183,38 @@ def test_what_a_format_cannot_hold_is_said(tmp_path, rng):
         write_light(tmp_path / "a.json", light, convention="unity")
     with pytest.raises(ValueError, match=r"a\.json: a \.json holds one light"):
         write_light(tmp_path / "a.json", light[None])
-    with pytest.raises(ValueError, match=r"a\.glb: cannot write \.glb, whose lights need pict"):
-        write_light(tmp_path / "a.glb", light)
     with pytest.raises(ValueError, match=r"light must be finite, got nan in 1 of 48 places"):
         write_light(tmp_path / "a.json", np.where(np.arange(48).reshape(3, 16) == 7, np.nan, light))
     (tmp_path / "b.npz").mkdir()
     with pytest.raises(IsADirectoryError, match=r"b\.npz: cannot be written: it is a folder"):
         write_light(tmp_path / "b.npz", light)
+
+
+def test_gltf_shows_the_light_in_its_pictures_too(tmp_path):
+    """Unpacked as Babylon.js does, and looked at from inside: +x has +z to the right, y up."""
+    light = np.zeros((3, 9))
+    light[:, :4] = [[9.0, 1.0, -2.0, 4.0], [2.0, 0.5, 0.5, -1.0], [-3.0, 1.0, 0.0, 0.0]]
+    fields = json.loads(write_light(tmp_path / "a.gltf", light).read_bytes())
+    binary = write_light(tmp_path / "a.glb", light).read_bytes()
+    one = fields["extensions"]["EXT_lights_image_based"]["lights"][0]
+    assert set(one) == {"irradianceCoefficients", "specularImages", "specularImageSize"}
+    seen = {"+x": "+x +z +y", "-x": "-x -z +y", "+y": "+y -x -z", "-y": "-y -x +z"}
+    seen |= {"+z": "+z -x +y", "-z": "-z +x +y"}  # ahead, right, up
+    at = (2 * np.arange(16) + 1) / 16 - 1
+    for index, names in zip(one["specularImages"][0], seen.values(), strict=True):
+        ahead, right, up = (
+            int(name[0] + "1") * np.eye(3)["xyz".index(name[1])] for name in names.split()
+        )
+        directions = ahead + at[:, None] * right - at[:, None, None] * up
+        directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+        expected = np.maximum(radiance(light, files.turned(directions.reshape(-1, 3))), 0)
+        head, data = fields["images"][index]["uri"].split(",")
+        assert head == "data:image/png;base64"
+        data = base64.b64decode(data)
+        assert data in binary
+        with Image.open(io.BytesIO(data)) as picture:
+            pixels = np.asarray(picture).reshape(-1, 4) / 255
+        assert pixels.shape == (256, 4)
+        got = pixels[:, :3] ** 2.2 / pixels[:, 3:]
+        # Bytes of a curve: 1 % of the largest channel.
+        assert np.abs(got - expected).max() < 0.01 * expected.max()

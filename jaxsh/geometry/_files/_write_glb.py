@@ -1,11 +1,11 @@
 """Write GLB (glTF 2.0, Khronos): one mesh, a primitive for each material, textures inside."""
 
 import json
-import struct
 from typing import Any
 
 import numpy as np
 
+from ..._core.gltf import glb
 from .._base_color import BaseColor
 from ._pictures import png
 from ._write_arrays import Arrays
@@ -47,7 +47,7 @@ def glb_files(arrays: Arrays, stem: str) -> dict[str, bytes]:
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": len(buffer.data)}],
     }
-    return {"": _container(json.dumps(content, separators=(",", ":")).encode(), buffer.data)}
+    return {"": glb(json.dumps(content, separators=(",", ":")).encode(), buffer.data)}
 
 
 class _Buffer:
@@ -130,15 +130,3 @@ def _materials(materials: tuple[BaseColor, ...], buffer: _Buffer) -> dict[str, A
         parts["images"] = images
         parts["textures"] = [{"source": i} for i in range(len(images))]
     return parts
-
-
-def _container(text: bytes, data: bytearray) -> bytes:
-    text += b" " * (-len(text) % 4)
-    size = 12 + 8 + len(text) + 8 + len(data)
-    return (
-        struct.pack("<4sII", b"glTF", 2, size)
-        + struct.pack("<I4s", len(text), b"JSON")
-        + text
-        + struct.pack("<I4s", len(data), b"BIN\0")
-        + bytes(data)
-    )

@@ -3,8 +3,9 @@
 from ._arrays import npz_file, read_npy, read_npz
 from ._cmgen import SAYS, cmgen_file, read_cmgen
 from ._gltf import read_gltf
+from ._gltf_write import gltf_file
 from ._splat_ply import SplatArrays, put_splats, read_splat_arrays, splats_problem
-from ._stored import Stored
+from ._stored import Stored, lands
 from ._three import read_three, three_file
 
 __all__ = [
@@ -13,6 +14,8 @@ __all__ = [
     "SplatArrays",
     "Stored",
     "cmgen_file",
+    "gltf_file",
+    "lands",
     "npz_file",
     "put_splats",
     "read_splat_arrays",

@@ -7,9 +7,8 @@ from jaxtyping import Float
 
 from ..._core.gltf import Document, open_document
 from ..._core.json_fields import extension, listed, number, numbers, shown, text, whole
+from ._gltf_write import NAME
 from ._stored import Stored, choose
-
-_NAME = "EXT_lights_image_based"
 
 
 def read_gltf(path: Path, which: str | int | None) -> Stored:
@@ -18,12 +17,12 @@ def read_gltf(path: Path, which: str | int | None) -> Stored:
     The light is that of the scene where nothing else is asked for. Its pictures are not looked at.
     """
     document = open_document(path, path.read_bytes())
-    fields = extension(document.fields, _NAME, "the file")
-    lights = listed(fields or {}, "lights", _NAME)
+    fields = extension(document.fields, NAME, "the file")
+    lights = listed(fields or {}, "lights", NAME)
     if not lights:
-        raise ValueError(f"it holds no light of {_NAME}")
+        raise ValueError(f"it holds no light of {NAME}")
     if not all(isinstance(light, dict) for light in lights):
-        raise ValueError(f"{_NAME} has lights that are no objects")
+        raise ValueError(f"{NAME} has lights that are no objects")
     names = [text(light, "name", "a light") or "" for light in lights]
     at = choose("lights", names, which, _of_scene(document, len(lights)))
     light, owner = lights[at], f"light {at}"
@@ -43,7 +42,7 @@ def _of_scene(document: Document, count: int) -> int | None:
     if not scenes:
         return None
     at = whole(document.fields, "scene", "the file", 0)
-    fields = extension(document.item("scenes", at, "the file"), _NAME, f"scene {at}")
+    fields = extension(document.item("scenes", at, "the file"), NAME, f"scene {at}")
     if not fields:
         return None
     light = whole(fields, "light", f"scene {at}")
