@@ -54,7 +54,8 @@ def explain(found: list[Case], decision: Decision, table: Space, *, strength: bo
             faults=tuple(faults),
             notes=tuple(notes),
         )
-    turn = look_for_turn(found, table, not strength)
+    # Among all directions of one height some turn fits each.
+    turn = look_for_turn(found, table) if strength else None
     if turn is not None and turn.decision.best.error < _MUCH_BETTER * best.error:
         verdict = judge(found, turn.decision, table, strength=strength)
         angle = math.degrees(turn.angle)

@@ -11,12 +11,15 @@ from ._search import FLOOR, Fits, fit, numbers, threshold
 from ._space import Combination, Space
 
 # A combination is out of the question where it is so much less likely, as a logarithm, …
-_LIKELY = 6.0
+_LIKELY = 8.0
 # … and, where it is hardly less plain, its error is larger by this factor, whatever is the number
 # of coefficients.
 _WORSE, _AS_PLAIN = 1.3, 4.0
 # What a scale costs that is none of a named convention.
 _COST_OF_SCALE = 6.0
+# A light from another direction has two numbers of its own only, and 48 placements to fall near:
+# at this error, an angle of a degree or two, one in some hundreds does.
+_MOST_OF_A_DIRECTION = 0.05
 # Below this cost a combination is a named one.
 _NAMED = 2.0
 # The largest number of other maps that are looked at.
@@ -77,6 +80,8 @@ def decide(
         limit = threshold(count, len(named) * len(found) * tried)
     else:
         limit = threshold(count, space.maps * len(found) * tried)
+    if free_scale:
+        limit = min(limit, _MOST_OF_A_DIRECTION)
     errors = np.stack([case.fits.error for case in found])
     # Errors that differ from channel to channel tell more than those that all channels share.
     given, wanted = beside(best, space)

@@ -31,7 +31,7 @@ def turned_light(light: Float[np.ndarray, "c k"], angle: float) -> Float[np.ndar
     return light * np.cos(m * angle) - other * np.sin(m * angle)
 
 
-def look_for_turn(found: list[Case], space: Space, free_scale: bool) -> Turned | None:
+def look_for_turn(found: list[Case], space: Space) -> Turned | None:
     """Find the angle at which some combination fits, if there is one."""
     plain = [case for case in found if case.cost == 0]
     if not plain or space.degree < 1:
@@ -58,7 +58,7 @@ def look_for_turn(found: list[Case], space: Space, free_scale: bool) -> Turned |
         else:
             low = first
     angle = (low + high) / 2
-    decision = decide(at(angle), space, free_scale=free_scale, tried=len(tried))
+    decision = decide(at(angle), space, tried=len(tried))
     if not decision.fits:
         return None
     return Turned(math.radians(angle), decision)

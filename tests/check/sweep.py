@@ -112,9 +112,14 @@ CASES += [
 
 if __name__ == "__main__":
     warnings.simplefilter("error")
-    count, total = int(sys.argv[1]), collections.Counter()
-    for case in CASES:
-        found = rates(count, show=len(sys.argv) > 2, **case)
-        total += found
-        print(case, dict(found))
-    print("all:", dict(total))
+    count, tables = int(sys.argv[1]), collections.defaultdict(collections.Counter)
+    for seed, case in enumerate(CASES):
+        known = "direction" if case.get("direction") else "picture"
+        key = known, case["degree"], case["channels"], case["noise"]
+        tables[key] += rates(count, seed, show=True, **case)
+    print("| known | degree | channels | noise | right | open | none fits | wrong |")
+    print("|---|---|---|---|---|---|---|---|")
+    for key, found in tables.items():
+        cells = [*key, *(found[kind] for kind in ("right", "open", "none", "wrong"))]
+        print(f"| {' | '.join(map(str, cells))} |")
+    print(dict(sum(tables.values(), collections.Counter())))
