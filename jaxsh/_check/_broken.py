@@ -140,7 +140,8 @@ def _powers(found: list[Case]) -> str:
     for case in found:
         if case.light.said or case.reading.said:
             continue
-        given, light = _by_degree(case.reading.channels), _by_degree(case.light.coefficients)
+        light = _by_degree(case.light.coefficients)
+        given = _by_degree(case.reading.channels)[: len(light)]
         if len(given) < 3 or light.min() <= 0:
             continue
         ratio = given / light

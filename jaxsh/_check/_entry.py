@@ -97,6 +97,8 @@ def _as_picture(picture) -> np.ndarray:
     array = array[..., None] if array.ndim == 2 else array
     check_shape("picture", array.shape, lat_long=True)
     check_finite("picture", array, wait=True)
+    if not array.any():
+        raise ValueError("picture must not be black throughout: there is nothing to check")
     return array
 
 

@@ -289,6 +289,7 @@ def test_what_is_traced_is_refused(image):
     [
         (lambda: jaxsh.check(np.ones((2, 7))), r"\(C, K\).*got shape \(2, 7\)"),
         (lambda: jaxsh.check(np.zeros(9)), "zero throughout"),
+        (lambda: jaxsh.check(np.ones(9), np.zeros((8, 16, 3))), "black throughout"),
         (lambda: jaxsh.check(np.ones(9), direction=np.zeros(3)), "nonzero x, y, z"),
         (lambda: jaxsh.check(np.ones((2, 9)), np.ones((8, 16, 3))), "channels of picture"),
         (lambda: jaxsh.check(np.ones(9), np.ones((16, 16, 3))), "twice as wide as high"),
