@@ -227,7 +227,7 @@ def _along(vectors, rays, middle, draw, seen, shaped) -> tuple[Any, Any]:
         return None, None
     if shaped:
         count = 1 if seen is None else seen.shape[2]
-        groups = rays.reshape(len(rays), count, -1, 3)
+        groups = rays.reshape(len(rays), count, rays.shape[1] // count, 3)
         whole = einsum("vi,srgi->vsrg", vectors, groups)
         if seen is None:
             return whole, None

@@ -257,7 +257,7 @@ def test_derivatives_of_the_disc_alone(rng):
 
 
 @pytest.mark.slow
-def test_batches_of_radiance_and_no_suns(rng):
+def test_batches_of_radiance(rng):
     made, sun = points(rng, 3, np.float32), suns(rng, 0.1, 0.2)
     batch = jnp.asarray(rng.uniform(size=(2, 2, 3)))
 
@@ -268,7 +268,11 @@ def test_batches_of_radiance_and_no_suns(rng):
     mapped = jax.vmap(shade)(batch)
     assert mapped.dtype == np.float32
     np.testing.assert_allclose(mapped, np.stack([shade(r) for r in batch]), rtol=1e-6)
-    none = Suns(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
+
+
+def test_no_suns_give_nothing():
+    """As `split_sun` finds none under an overcast sky."""
+    none = Suns(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 64, 3)))
     floor = rectangle([0, 0, 0], [1, 0, 0], [0, 1, 0])
     np.testing.assert_array_equal(shade_sun(none, floor, albedo=0.5), np.zeros((4, 3)))
 
