@@ -62,12 +62,12 @@ def test_tiles_are_exact_in_exact_directions(ball, light, dtype, tolerance):
     result = tiles(light, eye, material)
     assert result.color.dtype == dtype
     full = transfer.shade_glossy(light, ball, eye, material)
-    np.testing.assert_allclose(result.color, full, atol=tolerance)
+    np.testing.assert_allclose(result.color, full, rtol=0, atol=tolerance)
 
 
 @pytest.mark.parametrize(
     ("dtype", "tolerance"),
-    [pytest.param(jnp.float32, 2e-6, marks=pytest.mark.slow), (jnp.float64, 1e-14)],
+    [pytest.param(jnp.float32, 2e-6, marks=pytest.mark.slow), (jnp.float64, 4e-14)],
     ids=["float32", "float64"],
 )
 def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolerance):
@@ -95,7 +95,7 @@ def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolera
         axis = np.asarray(transfer.reflected_direction(eye, made.positions, made.normals))
         for tile, pole in enumerate(tiles.tiling.axes):
             at = np.asarray(tiles.directions[tile])
-            np.testing.assert_allclose(at @ pole, rule.directions[:, 2], atol=1e-12)
+            np.testing.assert_allclose(at @ pole, rule.directions[:, 2], rtol=0, atol=1e-12)
             lights = np.asarray(harmonics.evaluate(at, degree) @ light.T)
             for block in np.flatnonzero(np.asarray(tiles.tiling.tile) == tile):
                 members = np.asarray(tiles.tiling.permutation)[block]
@@ -103,7 +103,7 @@ def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolera
                 lobes = np.polynomial.polynomial.polyval(cosines - rule.middle, lobe)
                 expected = (lobes * samples[block].T) @ lights
                 np.testing.assert_allclose(
-                    got[members], expected, atol=tolerance * np.abs(ours).max()
+                    got[members], expected, rtol=0, atol=tolerance * np.abs(ours).max()
                 )
 
 
@@ -113,7 +113,7 @@ def test_tiles_with_albedos_per_vertex(ball, light, rng):
     tiles = make_tiles(ball, EYE, distant=True, num_tiles=5, block=16, quantized=False)
     result = tiles(light, EYE, material, distant=True, normalized=False)
     full = transfer.shade_glossy(light, ball, EYE, material, distant=True, normalized=False)
-    np.testing.assert_allclose(result.color, full, atol=1e-14)
+    np.testing.assert_allclose(result.color, full, rtol=0, atol=1e-14)
 
 
 @pytest.mark.slow
@@ -148,7 +148,7 @@ def test_a_local_rule_is_the_best_for_its_directions(rng):
     nodes = product_nodes(degree)
     lights = rng.normal(size=(4000, 25)) / np.sqrt(1 + harmonics.degrees(degree))
     poles = _local_rule._poles(4000)
-    np.testing.assert_allclose(np.arccos(poles[:, 2]).max(), 0.3, atol=1e-4)
+    np.testing.assert_allclose(np.arccos(poles[:, 2]).max(), 0.3, rtol=0, atol=1e-4)
     lobes = np.asarray(
         harmonics.convolve(
             harmonics.evaluate(rng.permutation(poles), degree), harmonics.phong(exponent, degree)
@@ -180,9 +180,9 @@ def test_the_lobe_of_a_rule_is_the_lobe_down_to_its_lowest_cosine():
     t = np.linspace(rule.lowest, 1, 50)
     exact = np.polynomial.legendre.legval(t, lobe)
     few = np.polynomial.polynomial.polyval(t - rule.middle, rule.powers @ zonal)
-    np.testing.assert_allclose(few, exact, atol=0.005 * exact[-1])
+    np.testing.assert_allclose(few, exact, rtol=0, atol=0.005 * exact[-1])
     widest = -(np.arccos(rule.directions[:, 2]).max() + 0.15)
-    np.testing.assert_allclose(rule.lowest, np.cos(widest), atol=1e-12)
+    np.testing.assert_allclose(rule.lowest, np.cos(widest), rtol=0, atol=1e-12)
 
 
 def test_a_rule_of_all_directions_is_the_exact_one():
@@ -193,7 +193,7 @@ def test_a_rule_of_all_directions_is_the_exact_one():
     t = np.linspace(-1, 1, 9)
     bands = np.polynomial.polynomial.polyvander(t, 4) @ rule.powers
     exact = np.polynomial.legendre.legvander(t, 4) * np.sqrt((2 * np.arange(5) + 1) / (4 * np.pi))
-    np.testing.assert_allclose(bands, exact, atol=1e-13)
+    np.testing.assert_allclose(bands, exact, rtol=0, atol=1e-13)
 
 
 def test_quantized_samples_are_half_a_scale_off(ball, light):
@@ -205,7 +205,7 @@ def test_quantized_samples_are_half_a_scale_off(ball, light):
     difference = np.asarray(rounded.samples) * scales - np.asarray(plain.samples)
     assert np.all(np.abs(difference) <= 0.501 * scales)
     colors = [t(light, EYE, MATERIAL).color for t in (plain, rounded)]
-    np.testing.assert_allclose(*colors, atol=4e-3 * np.abs(colors[0]).max())
+    np.testing.assert_allclose(*colors, rtol=0, atol=4e-3 * np.abs(colors[0]).max())
 
 
 def test_frames_reuse_compiled_code(ball, light):
@@ -252,8 +252,8 @@ def test_tiles_of_a_batch_of_lights(ball, light):
 
     lights = jnp.stack([light, 2 * light])
     both = jax.vmap(color)(lights)
-    np.testing.assert_allclose(both[1], color(lights[1]), atol=1e-12)
-    np.testing.assert_allclose(both[1], 2 * both[0], atol=1e-12)
+    np.testing.assert_allclose(both[1], color(lights[1]), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(both[1], 2 * both[0], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("count", "block"), [(7, 16), (1, 8), (1000, 7)])

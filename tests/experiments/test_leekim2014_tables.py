@@ -97,9 +97,9 @@ class TestScene:
 
     def test_eyes_go_around_the_vertical(self, scene):
         path = np.stack(eyes(scene, 5, 90.0))
-        np.testing.assert_allclose(path[0], scene.eye, atol=1e-6)
-        np.testing.assert_allclose(path[4], path[0], atol=1e-5)
-        np.testing.assert_allclose(path[2][:2], -path[0][:2], atol=1e-5)
+        np.testing.assert_allclose(path[0], scene.eye, rtol=0, atol=1e-6)
+        np.testing.assert_allclose(path[4], path[0], rtol=0, atol=1e-5)
+        np.testing.assert_allclose(path[2][:2], -path[0][:2], rtol=0, atol=1e-5)
         np.testing.assert_allclose(path[:, 2], path[0, 2])
 
 

@@ -48,7 +48,9 @@ def test_smooth_normals_do_not_depend_on_diagonals(tmp_path, rng):
         write_cube(path, start=rng.integers(0, 4, 6))
         mesh = read_mesh(path, normals="smooth")
         assert mesh.vertices.shape == (8, 3)
-        np.testing.assert_allclose(mesh.normals, np.asarray(mesh.vertices) / np.sqrt(3), atol=1e-7)
+        np.testing.assert_allclose(
+            mesh.normals, np.asarray(mesh.vertices) / np.sqrt(3), rtol=0, atol=1e-7
+        )
 
 
 @pytest.mark.parametrize(("angle", "vertices"), [(0, 24), (89.9, 24), (90, 8), (180, 8)])
@@ -60,7 +62,7 @@ def test_an_angle_splits_where_faces_meet_at_more(tmp_path, angle, vertices):
     expected = at_corners(read_mesh(path) if vertices == 24 else smooth)
     for mesh in (read, made):
         assert mesh.vertices.shape == (vertices, 3)
-        np.testing.assert_allclose(at_corners(mesh), expected, atol=1e-7)
+        np.testing.assert_allclose(at_corners(mesh), expected, rtol=0, atol=1e-7)
 
 
 def test_an_angle_rounds_a_cylinder_and_keeps_its_rims():
@@ -81,7 +83,7 @@ def test_an_angle_rounds_a_cylinder_and_keeps_its_rims():
     assert mesh.vertices.shape == (4 * count + 2, 3)
     found = at_corners(mesh)
     np.testing.assert_allclose(
-        found[2 * count :, :, 2], [[-1] * 3] * count + [[1] * 3] * count, atol=1e-7
+        found[2 * count :, :, 2], [[-1] * 3] * count + [[1] * 3] * count, rtol=0, atol=1e-7
     )
     outward = at_corners(mesh, "vertices")[: 2 * count] * [1, 1, 0]
     np.testing.assert_allclose(found[: 2 * count], outward, rtol=0, atol=1e-7)
@@ -100,7 +102,7 @@ def test_bad_normals_become_smooth_ones_and_are_counted(tmp_path):
         "given a smooth one"
     )
     found, places = at_corners(mesh), at_corners(mesh, "vertices")
-    np.testing.assert_allclose(found[:8], places[:8] / np.sqrt(3), atol=1e-7)
+    np.testing.assert_allclose(found[:8], places[:8] / np.sqrt(3), rtol=0, atol=1e-7)
     np.testing.assert_array_equal(found[8:], np.repeat([[n] * 3 for n in NORMALS[4:]], 2, axis=0))
 
 
@@ -119,7 +121,7 @@ def test_normals_of_any_length_are_unit(tmp_path):
         normals=[[f"{1e-30 * c:g}" for c in n] for n in NORMALS[:3]]
         + [[f"{1e300 * c:g}" for c in n] for n in NORMALS[3:]],
     )
-    np.testing.assert_allclose(at_corners(read_mesh(path))[::2, 0], NORMALS, atol=1e-7)
+    np.testing.assert_allclose(at_corners(read_mesh(path))[::2, 0], NORMALS, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("option", ["sharp", -1, 181, np.nan, True])
@@ -145,8 +147,8 @@ def test_a_sphere_far_away_keeps_its_shape(far):
     np.testing.assert_array_equal(mesh.faces, plain.faces)
     assert mesh.origin == tuple(map(float, far))
     # In float64 1e-9 is left at 6.4e6, and float32 rounds by 6e-8.
-    np.testing.assert_allclose(mesh.vertices, unit, atol=7e-8)
-    np.testing.assert_allclose(mesh.normals, plain.normals, atol=1e-7)
+    np.testing.assert_allclose(mesh.vertices, unit, rtol=0, atol=7e-8)
+    np.testing.assert_allclose(mesh.normals, plain.normals, rtol=0, atol=1e-7)
 
 
 def test_an_origin_is_taken_off_only_where_shape_is_lost(tmp_path):
@@ -214,7 +216,9 @@ def test_up_is_that_of_the_format_and_normals_turn_too(tmp_path):
     for normals in (mesh.normals, read_mesh(path, up="y", normals=30).normals):
         outward = np.cross(*np.moveaxis(np.diff(at_corners(mesh, "vertices"), axis=1), 1, 0))
         found = np.asarray(normals)[mesh.faces]
-        np.testing.assert_allclose(found, np.repeat(outward[:, None] / 4, 3, axis=1), atol=1e-7)
+        np.testing.assert_allclose(
+            found, np.repeat(outward[:, None] / 4, 3, axis=1), rtol=0, atol=1e-7
+        )
 
 
 def test_split_vertices_have_the_normals_of_the_whole(tmp_path):
@@ -231,4 +235,4 @@ def test_split_vertices_have_the_normals_of_the_whole(tmp_path):
     )
     np.testing.assert_array_equal(plain.normals, vertex_normals(plain.vertices, plain.faces))
     expected = np.asarray(mesh.vertices) / np.sqrt(3)
-    np.testing.assert_allclose(mesh.normals, expected, atol=1e-7)
+    np.testing.assert_allclose(mesh.normals, expected, rtol=0, atol=1e-7)

@@ -38,7 +38,7 @@ def test_every_format_gives_the_same_mesh(tmp_path, name):
     vertices, faces = shapes.sphere(5, 7)
     assert mesh.vertices.shape == vertices.shape
     # Text has 8 digits after the point.
-    np.testing.assert_allclose(mesh.vertices[mesh.faces], vertices[faces], atol=1e-8)
+    np.testing.assert_allclose(mesh.vertices[mesh.faces], vertices[faces], rtol=0, atol=1e-8)
     if not name.endswith("stl"):  # where vertices are met face by face
         np.testing.assert_array_equal(mesh.faces, faces)
     assert mesh.vertices.dtype == mesh.normals.dtype == np.float32
@@ -61,13 +61,13 @@ def test_trimesh_reads_the_same_triangles(tmp_path, rng):
     }.items():
         known.export(tmp_path / name, **options)
         mesh = read_mesh(tmp_path / name)
-        np.testing.assert_allclose(corners(mesh), known.triangles, atol=1e-7)
+        np.testing.assert_allclose(corners(mesh), known.triangles, rtol=0, atol=1e-7)
         np.testing.assert_allclose(
-            corners(mesh, "normals"), known.vertex_normals[known.faces], atol=1e-6
+            corners(mesh, "normals"), known.vertex_normals[known.faces], rtol=0, atol=1e-6
         )
         channels = slice(0, 3 if name.endswith("obj") else 4)
         found, expected = corners(mesh, "colors"), linear[known.faces]
-        np.testing.assert_allclose(found[..., channels], expected[..., channels], atol=1e-7)
+        np.testing.assert_allclose(found[..., channels], expected[..., channels], rtol=0, atol=1e-7)
     assert re.search("vn", (tmp_path / "a.obj").read_text())
 
 

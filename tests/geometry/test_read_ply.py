@@ -50,7 +50,7 @@ def test_ply_of_any_order_line_end_and_type(tmp_path, form, end):
     np.testing.assert_array_equal(mesh.vertices, SQUARE)
     assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
     known = [LINEAR[51], LINEAR[128], 1]
-    np.testing.assert_allclose(mesh.colors, [[*known, y] for _, y, _ in SQUARE], atol=1e-8)
+    np.testing.assert_allclose(mesh.colors, [[*known, y] for _, y, _ in SQUARE], rtol=0, atol=1e-8)
 
 
 def test_ply_what_is_too_much_is_left_out_and_said(tmp_path):
@@ -89,7 +89,7 @@ def test_ply_normals_uv_per_corner_and_texture(tmp_path):
     assert mesh.vertices.shape == (5, 3)  # the corner at the origin twice
     half = np.sqrt(0.5)
     np.testing.assert_allclose(
-        corners(mesh, "normals")[0], [[0, 0, 1], *[[0, -half, half]] * 2], atol=1e-7
+        corners(mesh, "normals")[0], [[0, 0, 1], *[[0, -half, half]] * 2], rtol=0, atol=1e-7
     )
 
 

@@ -90,8 +90,10 @@ def test_off_normals_colors_and_uv(tmp_path):
     rows = "".join(f"{x} {y} {z} 0 -3 4 51 128 255 255 {x} {y}\n" for x, y, z in SQUARE)
     mesh, said = read(tmp_path / "a.off", f"STCNOFF\n4 1 0\n{rows}4 0 1 2 3 7\n")
     assert said == ("colors up to 255 taken for bytes, indices into a color map at 1 faces ignored")
-    np.testing.assert_allclose(mesh.normals, [[0, -0.6, 0.8]] * 4, atol=1e-7)
-    np.testing.assert_allclose(mesh.colors, [[LINEAR[51], LINEAR[128], 1, 1]] * 4, atol=1e-7)
+    np.testing.assert_allclose(mesh.normals, [[0, -0.6, 0.8]] * 4, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(
+        mesh.colors, [[LINEAR[51], LINEAR[128], 1, 1]] * 4, rtol=0, atol=1e-7
+    )
     np.testing.assert_array_equal(mesh.uv, np.array(SQUARE)[:, :2])
 
 
@@ -102,7 +104,7 @@ def test_off_colors_of_faces_split_vertices(tmp_path):
     assert said == ""
     expected = [(LINEAR[51], 0, 1, 1), (0, 1, 0, 0.5), (1, 1, 1, 1)]
     np.testing.assert_allclose(
-        corners(mesh, "colors"), np.repeat([[c] for c in expected], 3, axis=1), atol=1e-7
+        corners(mesh, "colors"), np.repeat([[c] for c in expected], 3, axis=1), rtol=0, atol=1e-7
     )
 
 
@@ -128,7 +130,7 @@ def test_off_colors_of_faces_are_bytes_without_a_point(tmp_path):
     mesh, said = read(tmp_path / "a.off", text + "3 0 1 3\n", colors="linear")
     assert said == ""
     expected = [(0.2, 0, 1, 128 / 255), (0.2, 0, 1, 1), (1 / 255, 0, 0, 1), (1, 1, 1, 1)]
-    np.testing.assert_allclose(corners(mesh, "colors")[:, 0], expected, atol=1e-7)
+    np.testing.assert_allclose(corners(mesh, "colors")[:, 0], expected, rtol=0, atol=1e-7)
     mesh, said = read(tmp_path / "a.off", text + "3 0 1 3 2.5 0 0\n", colors="linear")
     assert said == "colors from 0 to 2.5 taken as they are"
-    np.testing.assert_allclose(corners(mesh, "colors")[-1, 0], (2.5, 0, 0, 1), atol=1e-7)
+    np.testing.assert_allclose(corners(mesh, "colors")[-1, 0], (2.5, 0, 0, 1), rtol=0, atol=1e-7)

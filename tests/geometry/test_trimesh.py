@@ -14,11 +14,11 @@ def test_a_mesh_goes_there_and_back():
     there = geometry.to_trimesh(mesh)
     assert there.is_watertight
     assert there.is_winding_consistent
-    np.testing.assert_allclose(there.vertex_normals, mesh.normals, atol=1e-7)
+    np.testing.assert_allclose(there.vertex_normals, mesh.normals, rtol=0, atol=1e-7)
     back = geometry.from_trimesh(there, normals="file")
     np.testing.assert_array_equal(back.vertices, mesh.vertices)
     np.testing.assert_array_equal(back.faces, mesh.faces)
-    np.testing.assert_allclose(back.normals, mesh.normals, atol=1e-7)
+    np.testing.assert_allclose(back.normals, mesh.normals, rtol=0, atol=1e-7)
 
 
 def test_a_scene_stands_where_its_nodes_put_it():

@@ -61,7 +61,7 @@ def test_ply_holds_each_number_to_the_bit(tmp_path, full):
     # Random colors are in no byte: sRGB by its definition, in floats; alpha as it is.
     red, alpha = np.asarray(full.colors, np.float64)[:, [0, 3]].T
     encoded = np.where(red <= 0.0031308, 12.92 * red, 1.055 * red ** (1 / 2.4) - 0.055)
-    np.testing.assert_allclose(rows["red"], encoded, atol=6e-8)
+    np.testing.assert_allclose(rows["red"], encoded, rtol=0, atol=6e-8)
     np.testing.assert_array_equal(rows["alpha"], alpha.astype(np.float32))
 
 
@@ -144,7 +144,7 @@ def test_glb_holds_each_number_to_the_bit(tmp_path, full):
     np.testing.assert_array_equal(arrays[at["COLOR_0"]], full.colors)
     np.testing.assert_array_equal(arrays[at["TEXCOORD_0"]][:, 0], full.uv[:, 0])
     np.testing.assert_allclose(
-        1 - arrays[at["TEXCOORD_0"]][:, 1].astype(float), full.uv[:, 1], atol=3e-8
+        1 - arrays[at["TEXCOORD_0"]][:, 1].astype(float), full.uv[:, 1], rtol=0, atol=3e-8
     )
     bounds = content["accessors"][at["POSITION"]]
     np.testing.assert_array_equal(bounds["min"], arrays[at["POSITION"]].min(axis=0))

@@ -29,7 +29,7 @@ def test_rays_run_row_by_row_from_the_top_left():
     np.testing.assert_array_equal(origins, np.tile([0, -2, 0], (8, 1)))
     # At distance 1 the picture is 2 high and 4 wide; +x is to the right, +z up.
     expected = [(x, 1, z) for z in (0.5, -0.5) for x in (-1.5, -0.5, 0.5, 1.5)]
-    np.testing.assert_allclose(directions / directions[:, 1:2], expected, atol=1e-6)
+    np.testing.assert_allclose(directions / directions[:, 1:2], expected, rtol=0, atol=1e-6)
     np.testing.assert_allclose(jnp.linalg.norm(directions, axis=1), 1, rtol=1e-6)
 
 
@@ -38,6 +38,7 @@ def test_up_turns_the_picture():
     np.testing.assert_allclose(
         camera.rays()[1] * np.sqrt(1.5),
         np.array([[1, 2, 1], [1, 2, -1], [-1, 2, 1], [-1, 2, -1]]) / 2,
+        rtol=0,
         atol=1e-15,
     )
 
@@ -54,9 +55,9 @@ def test_rays_keep_dtype_and_differentiate(dtype):
     tolerance = 4 * float(jnp.finfo(dtype).eps)
     for a, b in zip(plain, compiled, strict=True):
         assert a.dtype == b.dtype == dtype
-        np.testing.assert_allclose(a, b, atol=tolerance)
+        np.testing.assert_allclose(a, b, rtol=0, atol=tolerance)
     batch = jax.jit(jax.vmap(rays, (0, None)))(np.stack([position, 2 * position]), angle)
-    np.testing.assert_allclose(np.asarray(batch[1])[0], plain[1], atol=tolerance)
+    np.testing.assert_allclose(np.asarray(batch[1])[0], plain[1], rtol=0, atol=tolerance)
     if dtype == jnp.float64:
         check_grads(
             jax.jit(rays),
@@ -71,7 +72,7 @@ def test_rays_keep_dtype_and_differentiate(dtype):
 def test_camera_passes_through_jit():
     camera = Camera((0.0, -2.0, 0.0), (0.0, 0.0, 0.0), width=3, height=2)
     directions = jax.jit(lambda c: c.rays()[1])(camera)
-    np.testing.assert_allclose(directions, camera.rays()[1], atol=1e-15)
+    np.testing.assert_allclose(directions, camera.rays()[1], rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +109,7 @@ def test_facing_fills_the_picture(width, height, toward):
     assert np.abs(free[0] - free[1]).max() <= 2
     view = np.asarray(camera.position - camera.target)
     np.testing.assert_allclose(
-        view / np.linalg.norm(view), toward / np.linalg.norm(toward), atol=1e-5
+        view / np.linalg.norm(view), toward / np.linalg.norm(toward), rtol=0, atol=1e-5
     )
 
 
@@ -128,7 +129,7 @@ def test_a_viewer_in_front_sees_the_front(sheet):
     assert place[10, 1, 0] < -0.8
     assert place[1, 10, 2] > 0.8
     normal = np.asarray(interpolate(raster, sheet.normals))
-    np.testing.assert_allclose(normal[10, 10], [0, -1, 0], atol=1e-6)
+    np.testing.assert_allclose(normal[10, 10], [0, -1, 0], rtol=0, atol=1e-6)
 
 
 def test_the_silhouette_of_a_sphere_is_the_projected_disc():
@@ -149,7 +150,7 @@ def test_the_silhouette_of_a_sphere_is_the_projected_disc():
     np.testing.assert_array_equal(np.asarray(raster.mask)[clear], (sine < 0.25)[clear])
     # Where it is seen, the surface is that of the sphere, and its normal the place.
     place = np.asarray(interpolate(raster, mesh.vertices))[np.asarray(raster.mask)]
-    np.testing.assert_allclose(np.linalg.norm(place, axis=-1), 1, atol=1e-3)
+    np.testing.assert_allclose(np.linalg.norm(place, axis=-1), 1, rtol=0, atol=1e-3)
     assert place[:, 1].max() < -0.2
 
 
@@ -159,7 +160,7 @@ def test_raster_has_its_shapes_and_marks(sheet):
     assert raster.face.dtype == jnp.int32
     assert raster.barycentric.dtype == jnp.float32
     assert 0.05 < raster.mask.mean() < 0.95
-    np.testing.assert_allclose(raster.barycentric.sum(-1), raster.mask, atol=1e-6)
+    np.testing.assert_allclose(raster.barycentric.sum(-1), raster.mask, rtol=0, atol=1e-6)
     assert (raster.face[~np.asarray(raster.mask)] == -1).all()
 
 
@@ -177,7 +178,7 @@ def test_interpolation_is_exact_on_linear_functions_of_place(sheet):
     mask = np.asarray(raster.mask)
     assert 0.1 < mask.mean() < 0.9
     # Embree's float32: 1.5e-6 measured.
-    np.testing.assert_allclose(image[mask], expected[mask], atol=5e-6)
+    np.testing.assert_allclose(image[mask], expected[mask], rtol=0, atol=5e-6)
     assert (image[~mask] == 0).all()
 
 
@@ -192,7 +193,7 @@ def test_interpolation_compiles_batches_and_differentiates(sheet, rng, dtype):
 
     images, mask = map(np.asarray, (jax.jit(jax.vmap(draw, (0, None)))(batch, behind), raster.mask))
     assert images.dtype == dtype
-    np.testing.assert_allclose(images[1], draw(jnp.asarray(batch[1]), behind), atol=1e-6)
+    np.testing.assert_allclose(images[1], draw(jnp.asarray(batch[1]), behind), rtol=0, atol=1e-6)
     np.testing.assert_array_equal(images[0][~mask][0], behind)
 
     @jax.jit
@@ -202,9 +203,9 @@ def test_interpolation_compiles_batches_and_differentiates(sheet, rng, dtype):
 
     # Linear in the values: the Jacobian is the function, and its transpose collects each weight.
     forward, reverse, total = jax.tree.map(np.asarray, derivatives(batch[0], behind))
-    np.testing.assert_allclose(forward, reverse, atol=1e-7)
+    np.testing.assert_allclose(forward, reverse, rtol=0, atol=1e-7)
     found = np.einsum("hwcvk,vk->hwc", forward, batch[0])
-    np.testing.assert_allclose(found[mask], images[0][mask], atol=1e-6)
+    np.testing.assert_allclose(found[mask], images[0][mask], rtol=0, atol=1e-6)
     np.testing.assert_allclose(total[0].sum(), 3 * mask.sum(), rtol=1e-6)
     assert total[1][0] == (~mask).sum()
 
@@ -247,7 +248,9 @@ def test_samples_are_averaged_in_linear_light(sheet):
         np.asarray(interpolate(raster, values, background))
         for raster in (rasterize(sheet, camera, samples=3), rasterize(sheet, finer))
     )
-    np.testing.assert_allclose(image, fine.reshape(6, 3, 8, 3, 3).mean(axis=(1, 3)), atol=1e-6)
+    np.testing.assert_allclose(
+        image, fine.reshape(6, 3, 8, 3, 3).mean(axis=(1, 3)), rtol=0, atol=1e-6
+    )
 
 
 def test_background_may_be_a_picture_or_a_mark(sheet, rng, unchecked):
@@ -255,7 +258,7 @@ def test_background_may_be_a_picture_or_a_mark(sheet, rng, unchecked):
     raster = rasterize(sheet, camera, samples=2)
     picture = jnp.asarray(rng.uniform(size=(6, 8, 3)), jnp.float32)
     image = interpolate(raster, jnp.zeros_like(sheet.vertices), picture)
-    np.testing.assert_allclose(image, (1 - raster.alpha[..., None]) * picture, atol=1e-7)
+    np.testing.assert_allclose(image, (1 - raster.alpha[..., None]) * picture, rtol=0, atol=1e-7)
     marked = interpolate(raster, sheet.vertices, jnp.nan)
     np.testing.assert_array_equal(np.isnan(marked[..., 0]), ~np.asarray(raster.mask))
     gradient = jax.grad(lambda values: interpolate(raster, values, picture).sum())(sheet.vertices)

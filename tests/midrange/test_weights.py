@@ -37,7 +37,7 @@ def test_weights_at_and_near_samples(rng, make, dtype):
     values = make(x, p, exponent=8.0).values
     assert values.dtype == dtype
     np.testing.assert_array_equal(values[:6], np.eye(6, dtype=dtype))
-    np.testing.assert_allclose(values[6:12], np.eye(6), atol=3e-6)
+    np.testing.assert_allclose(values[6:12], np.eye(6), rtol=0, atol=3e-6)
     np.testing.assert_allclose(values.sum(axis=1), 1, rtol=50 * np.finfo(dtype).eps * 1e4)
 
     def share(x):
@@ -55,15 +55,15 @@ def test_shared_distance_has_the_true_slope():
     ends = np.array([[step, 0, 0], [-step, 0, 0]])
     values = np.asarray(inverse_distance_weights(ends, p, exponent=2.0).values)
     expected = (values[0] - values[1]) / (2 * step)
-    np.testing.assert_allclose(slope(jnp.zeros(3))[:, 0], expected, atol=1e-9)
+    np.testing.assert_allclose(slope(jnp.zeros(3))[:, 0], expected, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float32, 3e-5), (np.float64, 1e-13)])
 def test_least_squares_weights_are_linear(rng, dtype, tolerance):
     x, p = rng.normal(size=(50, 3)).astype(dtype), rng.normal(size=(9, 3)).astype(dtype)
     w = moving_least_squares_weights(x, p, exponent=3.0).values
-    np.testing.assert_allclose(w.sum(axis=1), 1, atol=tolerance)
-    np.testing.assert_allclose(w @ p, x, atol=tolerance)
+    np.testing.assert_allclose(w.sum(axis=1), 1, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(w @ p, x, rtol=0, atol=tolerance)
 
 
 def test_least_squares_weights_solve_their_problem(rng):
@@ -74,7 +74,7 @@ def test_least_squares_weights_solve_their_problem(rng):
     right = np.append(1, x[0]) - constraints.T @ u
     w = u + u * (constraints @ np.linalg.solve((constraints.T * u) @ constraints, right))
     found = moving_least_squares_weights(x, p).values[0]
-    np.testing.assert_allclose(found, w, atol=1e-12)
+    np.testing.assert_allclose(found, w, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("kept", [0, 1, 2])
@@ -85,8 +85,8 @@ def test_flat_samples_are_linear_along_themselves(rng, kept):
         p = p[:1]
     x = rng.normal(size=(20, 3))
     w = np.asarray(moving_least_squares_weights(x, p).values)
-    np.testing.assert_allclose(w.sum(axis=1), 1, atol=1e-13)
-    np.testing.assert_allclose((w @ p - x) @ axes.T, np.zeros((20, kept)), atol=1e-11)
+    np.testing.assert_allclose(w.sum(axis=1), 1, rtol=0, atol=1e-13)
+    np.testing.assert_allclose((w @ p - x) @ axes.T, np.zeros((20, kept)), rtol=0, atol=1e-11)
     assert np.abs(w).max() < 50
 
 
@@ -94,7 +94,7 @@ def test_flat_samples_are_linear_along_themselves(rng, kept):
 def test_grid_is_trilinear(rng, shape):
     grid = Grid(np.array([-1.0, 0, 2]), np.array([1.0, 3, 4]), shape)
     axes = [np.linspace(a, b, n) for a, b, n in zip(grid.lower, grid.upper, shape, strict=True)]
-    np.testing.assert_allclose(grid.points, list(itertools.product(*axes)), atol=1e-15)
+    np.testing.assert_allclose(grid.points, list(itertools.product(*axes)), rtol=0, atol=1e-15)
     # Inside, on samples, and outside: sums of products of linear functions are reproduced.
     x = np.concatenate([rng.uniform(-1.5, 4.5, (300, 3)), grid.points])
     weights = grid.weights(x)
@@ -103,9 +103,9 @@ def test_grid_is_trilinear(rng, shape):
         dense = np.zeros((len(x), grid.size))
         np.put_along_axis(dense, np.asarray(weights.indices), np.asarray(weights.values), axis=1)
     assert weights.samples == grid.size
-    np.testing.assert_allclose(dense.sum(axis=1), 1, atol=1e-12)
-    np.testing.assert_allclose(dense @ grid.points, x, atol=1e-12)
-    np.testing.assert_allclose(dense[300:], np.eye(grid.size), atol=1e-14)
+    np.testing.assert_allclose(dense.sum(axis=1), 1, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(dense @ grid.points, x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(dense[300:], np.eye(grid.size), rtol=0, atol=1e-14)
 
 
 def test_grid_interpolates_in_cells(rng):
@@ -116,7 +116,7 @@ def test_grid_interpolates_in_cells(rng):
     steps = np.linspace(0, 1, 4)
     expected = RegularGridInterpolator((steps, steps, steps), values)(x)
     found = np.sum(np.asarray(weights.values) * values.ravel()[weights.indices], axis=1)
-    np.testing.assert_allclose(found, expected, atol=1e-13)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13)
     # The blocks hold each position once, beside others of its cell.
     cells = weights.cells
     assert cells is not None
@@ -137,7 +137,7 @@ def test_weights_jit_and_slopes(rng):
         lambda x: grid.weights(x).values,
     ):
         compiled = jax.jit(make)
-        np.testing.assert_allclose(compiled(x), make(x), atol=1e-13)
+        np.testing.assert_allclose(compiled(x), make(x), rtol=0, atol=1e-13)
         jax.test_util.check_grads(compiled, (x,), order=1, modes=["fwd", "rev"], eps=1e-6)
 
 

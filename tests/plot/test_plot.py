@@ -58,7 +58,7 @@ def test_light_shows_the_function_at_its_directions(rng, dtype, array):
     radiance = np.asarray(harmonics.evaluate(directions, 2)) @ coefficients.T
     expected = 255 * np.asarray(imaging.tone_map(jnp.asarray(radiance), 0.7))
     # Half a pixel of a picture of 128 rows: the function changes by less than two steps of 255.
-    np.testing.assert_allclose(at(ax, np.stack([phi, theta], axis=-1)), expected, atol=3)
+    np.testing.assert_allclose(at(ax, np.stack([phi, theta], axis=-1)), expected, rtol=0, atol=3)
     assert ax.get_legend() is None
     assert not near(pixels(ax.figure), MAGENTA).any()
 
@@ -89,7 +89,7 @@ def test_light_draws_pictures_too(rng):
     rows, columns = np.meshgrid(np.arange(16), np.arange(40), indexing="ij")
     centers = np.stack([(columns + 0.5) * 9, (rows + 0.5) * 11.25], axis=-1).reshape(-1, 2)
     expected = 255 * np.asarray(imaging.srgb_encode(jnp.asarray(picture))).reshape(-1, 3)
-    np.testing.assert_allclose(at(ax, centers), expected, atol=1.01)
+    np.testing.assert_allclose(at(ax, centers), expected, rtol=0, atol=1.01)
     gray = plot.light(picture[..., :1], exposure=1.0)
     shown = at(gray, centers)
     assert (shown == shown[:, :1]).all()
