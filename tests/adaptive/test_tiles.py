@@ -130,6 +130,7 @@ def test_error_falls_with_the_directions(ball, light):
     assert errors[2] < 0.03
 
 
+@pytest.mark.slow
 def test_tiles_of_another_view_are_less_exact_and_no_more(ball, light):
     """The lobe has few terms where its directions are, and must not run away elsewhere."""
     material = transfer.Material(jnp.asarray(0.0), jnp.asarray(1.0), jnp.asarray(8.0))

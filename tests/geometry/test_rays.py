@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import shapes
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jaxsh.geometry import EmbreeRayScene, _embree, knot, make_mesh
@@ -109,6 +109,7 @@ def test_one_vector_stands_for_all_and_any_array_will_do(soup, rng, kind, dtype)
         assert ask(origins[:0], one).shape == (0,)
 
 
+@settings(max_examples=10)
 @given(chunk=st.integers(1, 700), threads=st.integers(1, 5))
 def test_chunks_and_threads_do_not_change_answers(chunk, threads):
     mesh = knot(1000)

@@ -90,6 +90,7 @@ def test_greedy_meets_its_target_with_few(rng):
     assert _error(greedy, looked) <= _error(place_samples(x, 6), looked)
 
 
+@pytest.mark.slow
 def test_samples_come_and_go(rng):
     x = rng.uniform(-0.5, 0.5, (300, 3))
     start, pool = place_samples(x, 1), place_samples(x, 24)

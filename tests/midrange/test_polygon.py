@@ -180,6 +180,7 @@ def test_polygon_is_differentiable_both_ways(rng):
     assert jnp.abs(second).max() > 0.1
 
 
+@pytest.mark.slow
 def test_polygon_in_float32_and_in_batches(rng):
     """Rounding grows as one over the angle; more points than a block, in any number of axes."""
     vertices = concave(rng)

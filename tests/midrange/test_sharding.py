@@ -38,6 +38,7 @@ def test_polygon_lights_above_a_horizon_behind_a_blocker(points):
     check_sharded(light, (points,), (ROWS,), (ROWS, ROWS))
 
 
+@pytest.mark.slow
 def test_a_polygon_light_s_value_and_reverse_mode(points):
     def light(points):
         value, pull = jax.vjp(lambda p: midrange.polygon_harmonics(LIGHT, p, DEGREE), points)

@@ -76,6 +76,7 @@ def test_the_error_measure(rng):
             np.testing.assert_allclose(error.mean[i, c] ** 2, sum(difference**2) / low[i, c] ** 2)
 
 
+@pytest.mark.slow
 def test_readings_of_the_smallest_luminance(rng, unchecked):
     sun, turbidity = sun_at(np.array([80.0, 40, 5])), np.array([2.5, 4, 6])
     views = upper_directions(rng, 20000)
