@@ -49,9 +49,10 @@ def as_rows(
     seen = jnp.all(jnp.isfinite(normals), axis=1) & jnp.any(normals != 0, axis=1)
     if mask is not None:
         check_type("mask", mask, Array, np.ndarray)
-        if mask.shape != places or mask.dtype != bool:
+        given_mask = jnp.asarray(mask)
+        if given_mask.shape != places or given_mask.dtype != bool:
             raise ValueError(f"expected mask {places} of booleans, got {described(mask)}")
-        seen = seen & jnp.asarray(mask).reshape(-1)
+        seen = seen & given_mask.reshape(-1)
     transfer = surface if given else unshadowed(jnp.zeros_like(normals), normals, degree)
     if weights is None:
         weights = seen.astype(transfer.dtype)
