@@ -227,10 +227,8 @@ def _shadows(
 
 def _render(value: inverse.Daylight, view: View, albedo: float) -> Float[np.ndarray, "p 3"]:
     """The picture that a light found makes, shadows included."""
-    rest, _ = value.parts(view.baked.coefficients.shape[1], sky.preetham_harmonics)
-    sun = _sunlit(view, value.sun) * jnp.maximum(view.baked.normals @ value.sun, 0)
-    shaded = transfer.shade_diffuse(rest, view.baked, albedo)
-    return np.asarray(shaded + albedo / np.pi * sun[:, None] * value.facing[None])
+    rest = transfer.shade_diffuse(value.harmonics(_DEGREE, sun=False), view.baked, albedo)
+    return np.asarray(rest + transfer.shade_sun(value.suns, view.baked, view.scene, albedo))
 
 
 def _row(

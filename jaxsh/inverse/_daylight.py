@@ -7,8 +7,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .. import sky as sky_room
-from .._core.checks import check_degree, check_function
+from .._core.checks import check_degree, check_flag, check_function
 from ..harmonics import evaluate, num_coefficients
+from ..sphere import Suns
 from ._fit_sky import Sky, preetham
 
 # Irradiance of a surface that faces a uniform disc of the sun's size and radiance 1. The light is
@@ -45,22 +46,30 @@ class Daylight(eqx.Module):
     sun_radiance: Float[Array, " 3"]
     ground: Float[Array, " 3"]
 
-    def harmonics(self, degree: int, *, sky: Sky | None = None) -> Float[Array, "3 k"]:
-        """Coefficients (3, K) of all of it, in the unit of what was observed.
+    def harmonics(
+        self, degree: int, *, sun: bool = True, sky: Sky | None = None
+    ) -> Float[Array, "3 k"]:
+        """Coefficients (3, K) of the light, in the unit of what was observed.
 
-        `sky`: as for `fit_daylight`, Preetham's by default, of degree 6 at most: what is beyond
-        is zero. Differentiable. Raises `ValueError` for a degree below 1, which cannot tell ground
-        from sky.
+        `sun=False` leaves out the sun's disc, which `suns` is beside it, though not what it makes
+        of the ground. `sky`: as for `fit_daylight`, Preetham's by default, of degree 6 at most:
+        what is beyond is zero. Differentiable. Raises `ValueError` for a degree below 1, which
+        cannot tell ground from sky.
         """
         degree = check_degree(degree)
         if degree < 1:
             raise ValueError("daylight needs degree >= 1, got 0")
-        if sky is not None:
-            check_function("sky", sky)
-        diffuse, sun = self.parts(
-            num_coefficients(degree), sky or preetham(min(degree, 6), (2.0, 10.0))
-        )
-        return diffuse + sun
+        if sky is None:
+            sky = preetham(min(degree, 6), (2.0, 10.0))
+        check_function("sky", sky)
+        diffuse, disc = self.parts(num_coefficients(degree), sky)
+        return diffuse + disc if check_flag("sun", sun) else diffuse
+
+    @property
+    def suns(self) -> Suns:
+        """The sun's disc, for `transfer.shade_sun`, in the unit of what was observed."""
+        size = jnp.full(1, 4 * math.pi * math.sin(sky_room.SUN_RADIUS / 2) ** 2, self.sun.dtype)
+        return Suns(self.sun[None], size, (self.exposure * self.sun_radiance)[None])
 
     def parts(self, count: int, sky: Sky) -> tuple[Float[Array, "3 k"], Float[Array, "3 k"]]:
         """`count` coefficients of sky and ground, which the sun lights too, and of the sun."""

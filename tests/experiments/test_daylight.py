@@ -8,7 +8,7 @@ from runs import run
 @pytest.mark.slow
 def test_known_shadows_find_the_sun(tmp_path):
     options = ["--skies", "preetham", "--settings", "1", "--height", "24", "--directions", "512"]
-    folder, (ignored, traced) = run(tmp_path, "inverse.daylight", *options, small=True)
+    folder, (ignored, traced) = run(tmp_path, "inverse.daylight", *options)
     assert ignored["converged"]
     assert traced["converged"]
     assert traced["sun_error"] < 0.5 < 1.5 < ignored["sun_error"]

@@ -178,6 +178,10 @@ def test_its_light_is_that_of_sky_sun_and_ground():
     light = 0.02 * sky.with_ground(light, value.ground)
     error = np.abs(value.harmonics(4) - light).max() / np.abs(light).max()
     assert error < 6e-5
+    disc = value.suns.harmonics(4)
+    np.testing.assert_allclose(
+        value.harmonics(4, sun=False) + disc, light, rtol=0, atol=6e-5 * np.abs(light).max()
+    )
     with pytest.raises(ValueError, match="daylight needs degree >= 1, got 0"):
         value.harmonics(0)
 
