@@ -11,10 +11,11 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import (
-    as_finite,
+    as_host_float,
     as_path,
     check_choice,
     check_coefficients,
+    check_finite,
     check_size,
     described,
     nearest,
@@ -223,7 +224,9 @@ def write_light(
     """
     path = as_path(path)
     _check_options(convention, up)
-    light = np.asarray(as_finite(light, "light", wait=True))
+    light = as_host_float(light, "light")
+    check_finite("light", light, wait=True)
+    light = light.astype(np.float32) if light.dtype.itemsize < 4 else light
     degree = check_coefficients("light", light)
     if light.ndim < 2 or light.shape[-2] != 3:
         raise ValueError(f"expected light (..., 3, K), got shape {light.shape}")

@@ -6,6 +6,7 @@ import io
 import json
 import warnings
 
+import jax
 import jax.numpy as jnp
 import light_files as files
 import numpy as np
@@ -151,6 +152,22 @@ def test_what_is_written_is_read_back(tmp_path, rng):
             np.testing.assert_allclose(again, light.astype(dtype), rtol=0, atol=atol)
     left = {path.name for path in tmp_path.iterdir()}
     assert left == {"a.glb", "a.gltf", "a.json", "a.npz", "deep"}
+
+
+def test_single_precision_at_a_users(tmp_path):
+    """Without x64: what float32 cannot hold is refused; halves are written as float32."""
+    path = tmp_path / "a.npy"
+    with jax.enable_x64(False):
+        assert read_light(written(tmp_path / "a.json", THREE)).dtype == jnp.float32
+        np.save(path, np.full((3, 9), 1e300))
+        with pytest.raises(
+            ValueError, match=r"a\.npy: its numbers are beyond the range of float32"
+        ):
+            read_light(path, convention="jaxsh")
+        half = write_light(tmp_path / "a.npz", jnp.ones((3, 9), jnp.bfloat16))
+        assert read_light(half).dtype == jnp.float32
+    with pytest.raises(ValueError, match="expected known values for light, got traced ones"):
+        jax.jit(lambda light: write_light(path, light))(jnp.ones((3, 9)))
 
 
 def test_an_archive_keeps_any_convention(tmp_path, rng):
