@@ -73,23 +73,42 @@ def test_one_position_has_one_pattern_and_a_seed_its_bits(rng):
     assert min((fraction == value).mean() for value in (0, 1)) > 0.1
 
 
-def test_no_ray_leaves_for_a_sun_below(rng):
-    class Counting:
-        rays = 0
+class Counting:
+    """A scene that counts its rays; of nothing, or what another one holds."""
 
-        def occluded(self, origins, directions, max_distance=np.inf):
-            self.rays += len(origins)
+    def __init__(self, scene=None):
+        self.scene, self.rays = scene, 0
+
+    def occluded(self, origins, directions, max_distance=np.inf):
+        self.rays += len(origins)
+        if self.scene is None:
             return np.zeros(len(origins), bool)
+        return self.scene.occluded(origins, directions, max_distance)
 
-        def closest_hit(self, origins, directions):
-            raise AssertionError
+    def closest_hit(self, origins, directions):
+        raise AssertionError
 
+
+def test_no_ray_leaves_for_a_sun_below(rng):
     for height, rays in ((-0.2, 0), (0, (500, 1100)), (0.2, 16 * 100)):
         scene = Counting()
         visibility = sun_visibility(sun(height), floor(100, rng), scene, offset=1e-3)
         least, most = rays if isinstance(rays, tuple) else (rays, rays)
         assert least <= scene.rays <= most
         assert int(visibility.seen.sum()) == scene.rays
+
+
+@pytest.mark.parametrize("shaped", [False, True])
+def test_of_many_rays_the_first_speak_for_the_rest_where_they_agree(rng, shaped):
+    shape, elevation = in_groups() if shaped else None, 0.6
+    for share, rays in ((-1.1, 16), (0.3, 64), (1.1, 16)):
+        scene = Counting(ray_scene(wall(elevation)))
+        above = sun(elevation - share * RADIUS, shape)
+        visibility = sun_visibility(above, floor(200, rng), scene, rays=64, offset=1e-3)
+        assert scene.rays == 200 * rays
+        inside = np.clip(share, -1, 1)
+        exact = (np.arccos(inside) - inside * np.sqrt(1 - inside**2)) / np.pi
+        np.testing.assert_allclose(visibility.fraction, exact, rtol=0, atol=0.05)
 
 
 @pytest.mark.slow

@@ -40,7 +40,7 @@ def guided(rays: int, degree: int, seed: int, dtype: np.dtype) -> Directions:
     if number == count:  # no guide speaks for another direction, so none needs its neighbors
         all_of_them = np.arange(count)
         return Directions(vectors, basis, all_of_them, all_of_them, np.empty((0, count), int))
-    guides = _spread(vectors, number)
+    guides = spread(vectors, number)
     chosen = vectors[guides]
     ranked = np.concatenate(
         [np.argsort(-(part @ chosen.T), axis=1)[:, 1 : _AROUND + 1] for part in _parts(chosen)]
@@ -64,7 +64,7 @@ def turned_fibonacci(count: int, seed: int, dtype: np.dtype) -> Float[np.ndarray
     return (directions @ rotation.T).astype(dtype)
 
 
-def _spread(vectors: Float[np.ndarray, "d 3"], count: int) -> Int[np.ndarray, " count"]:
+def spread(vectors: Float[np.ndarray, "d 3"], count: int) -> Int[np.ndarray, " count"]:
     """Choose `count` vectors, each farthest from those before it; ascending indices."""
     chosen = np.empty(count, int)
     distance = np.full(len(vectors), np.inf)
