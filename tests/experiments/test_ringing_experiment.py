@@ -84,6 +84,7 @@ def test_the_window_of_sloan_2017_by_its_formula():
     assert peers.sinc4(0.5, 3)[[0, 4, 9]].tolist() == [1, 0, 0]
 
 
+@pytest.mark.slow
 def test_needs_and_a_sunny_picture():
     """The ground receives what it does on a clear day, in kilolux."""
     light = sphere.project_lat_long(sunny(64), 2)
