@@ -1,4 +1,4 @@
-"""Pictures in and out: light probes, image files, a camera and what it sees of a mesh.
+"""Pictures and lights in and out: probes, files of both, a camera and what it sees of a mesh.
 
 Everything is linear radiance until `tone_map` makes it fit for a screen; tone curves live here
 and nowhere else. Pictures are (height, width, channels), row 0 on top. What makes a picture from
