@@ -8,12 +8,13 @@ from jaxtyping import Float
 
 from ..harmonics import degrees
 from ._decide import Case, Choice, Decision, near_one
-from ._known import convention_of, judge, residuals, same_layout
+from ._known import convention_of, conversion, judge, residuals, same_layout
 from ._matching import Match, constants, described, match
 from ._search import numbers
 from ._space import Space, space
 from ._turn import look_for_turn
 from ._verdict import Verdict
+from ._window import absolute, look_for_window, named, said
 from ._words import factor, facts, percent
 
 # Single coefficients are looked at up to this degree, with the first tolerance that says something.
@@ -26,6 +27,47 @@ _NEAR = 0.2
 _ALIKE = 1.5
 # A turn by any angle is believed where it leaves no more than this of the error.
 _MUCH_BETTER = 0.3
+# Below this error nothing is left for a window to explain.
+_EXACT = 0.01
+
+
+def windowed(
+    found: list[Case], decision: Decision, table: Space, *, strength: bool
+) -> Verdict | None:
+    """The verdict on a light of which each degree has a factor, where that explains much more."""
+    if decision.best.error <= _EXACT:
+        return None
+    seen = look_for_window(found, table)
+    if seen is None or seen.error > _MUCH_BETTER * decision.best.error:
+        return None
+    relative = seen.factors / seen.factors[0]
+    kind, quantity = named(relative, seen.error)
+    at = seen.at
+    if quantity:
+        at = at._replace(quantity=table.quantities.index(quantity))
+    choice = Choice(seen.case, at, seen.error, absolute(seen, quantity))
+    convention = convention_of(choice, table)
+    words = facts(convention, gray=seen.case.reading.hides_layout)
+    if not quantity:
+        words.pop("quantity", None)
+    scale = 1.0 if not strength or near_one(choice.scale, seen.error) else choice.scale
+    call = conversion(choice, convention, scale, table)
+    call = f'{call} / harmonics.window("{kind}", {table.degree})' if kind else ""
+    return Verdict(
+        decided=bool(kind),
+        summary=", ".join(words.values()),
+        agree=tuple(
+            name
+            for name, other in table.named.items()
+            if kind and table.map[other] == table.map[at] and same_layout(name, seen.case.reading)
+        ),
+        found=convention,
+        scale=scale,
+        residual=seen.error,
+        residuals=residuals(found, table),
+        faults=(said(relative, kind, quantity, seen.error),),
+        conversion=call,
+    )
 
 
 def explain(found: list[Case], decision: Decision, table: Space, *, strength: bool) -> Verdict:
@@ -37,15 +79,15 @@ def explain(found: list[Case], decision: Decision, table: Space, *, strength: bo
         case, matched, small = broken
         layout = case.reading.layout
         convention = small.convention(matched.at, layout)
-        said = facts(convention, gray=case.reading.hides_layout)
+        words = facts(convention, gray=case.reading.hides_layout)
         wrong = len(matched.faults)
         faults = described(
             list(matched.faults), constants(convention.normalization, small.degree), small.degree
         )
-        faults += [words for words in (case.reading.said, case.light.said) if words]
+        faults += [fault for fault in (case.reading.said, case.light.said) if fault]
         return Verdict(
             decided=False,
-            summary=f"{', '.join(said.values())}, but for {wrong} of {len(matched.right)} "
+            summary=f"{', '.join(words.values())}, but for {wrong} of {len(matched.right)} "
             "coefficients",
             found=convention,
             scale=1.0 if abs(matched.scale - 1) < 0.02 else matched.scale,
@@ -94,10 +136,10 @@ def _by_chance(best: Choice, decision: Decision, found: list[Case], table: Space
         for name, error in errors.items()
         if error <= _ALIKE * best.error and same_layout(name, best.case.reading)
     )
-    said = ", ".join(facts(convention, gray=best.case.reading.hides_layout).values())
+    words = ", ".join(facts(convention, gray=best.case.reading.hides_layout).values())
     return Verdict(
         decided=False,
-        summary=f"{said}, or by chance",
+        summary=f"{words}, or by chance",
         agree=near,
         found=convention,
         scale=1.0 if near_one(best.scale, best.error) else best.scale,

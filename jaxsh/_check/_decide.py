@@ -135,5 +135,5 @@ def _plainest(case: Case, number: int, space: Space, free_scale: bool) -> Choice
 
 
 def near_one(scale: float, error: float) -> bool:
-    """A scale that is 1 but for errors as large as those of the fit."""
-    return bool(abs(scale - 1) <= min(0.1, max(0.02, error)))
+    """A scale that is 1 but for what the errors of the fit do to it."""
+    return bool(abs(scale - 1) <= min(0.1, max(0.02, 0.3 * error)))

@@ -11,7 +11,7 @@ from .._core.checks import as_host_float, check_finite, described
 from .._core.pictures import check_shape
 from ._alone import check_alone
 from ._basis import check_basis
-from ._broken import explain
+from ._broken import explain, windowed
 from ._decide import cases, decide
 from ._given import MOST, Reading, mistaken, of_direction, of_picture, read
 from ._known import furnace, judge
@@ -157,7 +157,10 @@ def _verdict(readings, lights, mistakes, *, strength: bool, most: int = MOST) ->
             more = cases(some, others, table)
             decision = decide([*found, *more], table, free_scale=not strength)
             found = [*found, *more]
-        if decision.fits:
+        verdict = windowed(found, decision, table, strength=strength)
+        if verdict is not None:
+            pass
+        elif decision.fits:
             verdict = judge(found, decision, table, strength=strength)
         else:
             verdict = explain(found, decision, table, strength=strength)

@@ -208,6 +208,31 @@ def test_single_coefficients(spoil, fault, image, light):
     assert verdict.found.axes == ("+x", "+y", "+z")
 
 
+@pytest.mark.parametrize("kind", ["hann", "lanczos"])
+def test_windows(kind, image, light):
+    n = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2]) / 3
+    weights = {"hann": (1 + np.cos(np.pi * n)) / 2, "lanczos": np.sinc(n)}[kind]
+    for name in ("jaxsh", "filament-irradiance"):
+        given = harmonics.convert(light * weights, "jaxsh", name)
+        verdict = jaxsh.check(given, image)
+        assert verdict.decided
+        assert name in verdict.agree
+        assert f"the window '{kind}'" in verdict.faults[0]
+        scope = {"harmonics": harmonics, "coefficients": given}
+        with jax.numpy_rank_promotion("allow"):  # as at a user's
+            back = eval(verdict.conversion, scope)
+        np.testing.assert_allclose(back, light, rtol=0, atol=0.01 * np.abs(light).max())
+
+
+def test_another_lobe(image):
+    light = np.asarray(jaxsh.sphere.project_lat_long(jnp.asarray(image), 2))
+    lobe = np.repeat([1, 11 / 12, 10 / 13], [1, 3, 5])  # cos^10, normalized
+    verdict = jaxsh.check(light * lobe, image)
+    assert not verdict.decided
+    assert "a lobe cosⁿ with n = 10" in verdict.faults[0]
+    assert "z up" in verdict.summary
+
+
 def test_a_light_of_another_picture_fits_nothing(light, rng):
     verdict = jaxsh.check(rng.normal(size=(3, 9)), samples.picture(rng))
     assert not verdict.decided
