@@ -14,7 +14,7 @@ from ._search import numbers
 from ._space import Space, space
 from ._turn import look_for_turn
 from ._verdict import Verdict
-from ._window import absolute, look_for_window, named, said
+from ._window import absolute, doubtful_window, look_for_window, named, said
 from ._words import factor, facts, percent
 
 # Single coefficients are looked at up to this degree, with the first tolerance that says something.
@@ -33,15 +33,21 @@ _EXACT = 0.01
 
 def windowed(
     found: list[Case], decision: Decision, table: Space, *, strength: bool
-) -> Verdict | None:
-    """The verdict on a light of which each degree has a factor, where that explains much more."""
+) -> tuple[Verdict | None, str]:
+    """The verdict on a light of which each degree has a factor, where that explains much more.
+
+    Where a window known by name explains nearly as much as no window, that is put in words only.
+    """
     if decision.best.error <= _EXACT:
-        return None
+        return None, ""
+    doubt = doubtful_window(decision.best, table) if decision.fits else ""
     seen = look_for_window(found, table)
     if seen is None or seen.error > _MUCH_BETTER * decision.best.error:
-        return None
+        return None, doubt
     relative = seen.factors / seen.factors[0]
     kind, quantity = named(relative, seen.error)
+    if kind == "none":
+        return None, doubt
     at = seen.at
     if quantity:
         at = at._replace(quantity=table.quantities.index(quantity))
@@ -53,7 +59,7 @@ def windowed(
     scale = 1.0 if not strength or near_one(choice.scale, seen.error) else choice.scale
     call = conversion(choice, convention, scale, table)
     call = f'{call} / harmonics.window("{kind}", {table.degree})' if kind else ""
-    return Verdict(
+    verdict = Verdict(
         decided=bool(kind),
         summary=", ".join(words.values()),
         agree=tuple(
@@ -68,6 +74,7 @@ def windowed(
         faults=(said(relative, kind, quantity, seen.error),),
         conversion=call,
     )
+    return verdict, ""
 
 
 def explain(found: list[Case], decision: Decision, table: Space, *, strength: bool) -> Verdict:

@@ -11,7 +11,7 @@ from ._search import FLOOR, Fits, fit, numbers, threshold
 from ._space import Combination, Space
 
 # A combination is out of the question where it is so much less likely, as a logarithm, …
-_LIKELY = 8.0
+LIKELY = 8.0
 # … and, where it is hardly less plain, its error is larger by this factor, whatever is the number
 # of coefficients.
 _WORSE, _AS_PLAIN = 1.3, 4.0
@@ -89,7 +89,7 @@ def decide(
     scores = np.stack([_score(case, space, apart) for case in found])
     near = errors <= _WORSE * math.hypot(best.error, FLOOR)
     near &= costs <= costs[number, *best.at] + _AS_PLAIN
-    near |= scores - scores[number, *best.at] <= _LIKELY
+    near |= scores - scores[number, *best.at] <= LIKELY
     near &= np.isfinite(errors)
     groups: dict[tuple[str, str, int], Choice] = {}
     places = np.argwhere(near)

@@ -157,13 +157,12 @@ def _verdict(readings, lights, mistakes, *, strength: bool, most: int = MOST) ->
             more = cases(some, others, table)
             decision = decide([*found, *more], table, free_scale=not strength)
             found = [*found, *more]
-        verdict = windowed(found, decision, table, strength=strength)
-        if verdict is not None:
-            pass
-        elif decision.fits:
-            verdict = judge(found, decision, table, strength=strength)
-        else:
-            verdict = explain(found, decision, table, strength=strength)
+        verdict, doubt = windowed(found, decision, table, strength=strength)
+        if verdict is None:
+            tell = judge if decision.fits else explain
+            verdict = tell(found, decision, table, strength=strength)
+        if doubt:
+            verdict = replace(verdict, decided=False, open=(*verdict.open, doubt))
         verdicts.append((decision, verdict))
     if not verdicts:
         raise ValueError(

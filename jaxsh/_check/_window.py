@@ -7,14 +7,14 @@ import numpy as np
 from jaxtyping import Float
 
 from ..harmonics import clamped_cosine, degrees, window
-from ._decide import Case
+from ._decide import LIKELY, Case, Choice, beside
 from ._search import FLOOR, numbers, threshold
 from ._space import Combination, Space
-from ._words import factor
+from ._words import factor, percent
 
 # How much larger the error of every other convention must be.
 _CLEAR = 1.5
-_KINDS = "hann", "lanczos", "positive"
+_KINDS = "none", "hann", "lanczos", "positive"
 # Factors this near are one.
 _SAME = 0.01
 
@@ -70,18 +70,48 @@ def look_for_window(found: list[Case], space: Space) -> Windowed | None:
     )
 
 
-def named(relative: Float[np.ndarray, " bands"], error: float) -> tuple[str, str]:
-    """Say what factors relative to the first are: the window and the kernel that have them."""
-    degree = len(relative) - 1
-    slack = max(_SAME, error)
+def kernels(degree: int) -> dict[tuple[str, str], Float[np.ndarray, " bands"]]:
+    """Factors of each degree by window and quantity; irradiance is that over π."""
     steps = np.arange(degree + 1)
-    zonal = np.asarray(clamped_cosine(degree), np.float64) * np.sqrt(4 * np.pi / (2 * steps + 1))
-    for quantity, kernel in (("radiance", np.ones(degree + 1)), ("irradiance", zonal / zonal[0])):
-        for kind in _KINDS:
-            weights = np.asarray(window(kind, degree), np.float64)[steps**2]
-            if np.abs(relative - kernel * weights).max() <= slack:
-                return kind, quantity
-    return "", ""
+    zonal = np.asarray(clamped_cosine(degree), np.float64)
+    zonal = zonal * np.sqrt(4 * np.pi / (2 * steps + 1)) / np.pi
+    return {
+        (kind, quantity): kernel * np.asarray(window(kind, degree), np.float64)[steps**2]
+        for quantity, kernel in (("radiance", np.ones(degree + 1)), ("irradiance", zonal))
+        for kind in _KINDS
+    }
+
+
+def named(relative: Float[np.ndarray, " bands"], error: float) -> tuple[str, str]:
+    """Say what factors relative to the first are: the nearest window, and before it the kernel.
+
+    Names neither where none is near, and the window `"none"` where the kernel alone is nearest.
+    """
+    apart = {
+        key: float(np.abs(relative - known).max())
+        for key, known in kernels(len(relative) - 1).items()
+    }
+    nearest = min(apart, key=lambda key: apart[key])
+    return nearest if apart[nearest] <= max(_SAME, error) else ("", "")
+
+
+def doubtful_window(best: Choice, space: Space) -> str:
+    """Say which window, in place of the quantity that was found, fits about as well."""
+    if space.degree < 2:
+        return ""
+    given, _ = beside(best, space)
+    light = best.case.light.coefficients @ space.turned[best.at.placement].T
+    count, l = max(numbers(light), numbers(given)), degrees(space.degree)
+    likely: dict[str, float] = {}
+    for (kind, quantity), kernel in kernels(space.degree).items():
+        wanted = light * kernel[l]
+        scale = float(np.sum(given * wanted) / np.sum(wanted**2))
+        error = float(np.linalg.norm(given - scale * wanted))
+        error /= max(abs(scale) * float(np.linalg.norm(wanted[:, 1:])), 1e-30)
+        worse = count * math.log(math.hypot(error, FLOOR) / math.hypot(best.error, FLOOR))
+        if kind != "none" and scale > 0 and worse <= LIKELY:
+            likely[f"{quantity} under the window {kind!r} fits to {percent(error)}"] = error
+    return min(likely, key=lambda said: likely[said], default="")
 
 
 def said(relative: Float[np.ndarray, " bands"], kind: str, quantity: str, error: float) -> str:
