@@ -1,17 +1,18 @@
 """Light from all around, in spherical harmonics, from the shading of a diffuse surface."""
 
-from typing import Any, Literal
+import functools
+from typing import Any, Literal, get_args
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import ArrayLike, Bool, Float
+from jaxtyping import ArrayLike, Bool, Float, Int
 
-from .._core.checks import as_host_float, check_choice, check_degree, check_number
+from .._core.checks import as_host_float, as_host_integer, check_choice, check_degree, check_number
 from ..transfer import Transfer
 from ._checks import check_end, check_solver
 from ._light_prior import power_law
-from ._light_recover import Loss, recover
+from ._light_recover import Loss, Options, Positive, Window, recover
 from ._light_result import RecoveredLight
 from ._pixels import as_rows
 from ._solve import everywhere
@@ -19,7 +20,6 @@ from ._solve import everywhere
 # Bands of the light that a picture with normals is fitted with, under a prior: what lies above
 # shifts irradiance by less than 0.3 % (`python -m experiments run inverse.light`).
 _BANDS = 12
-_WINDOWS = "none", "hann", "lanczos", "zonal-sinc"
 
 
 def fit_light(
@@ -30,10 +30,12 @@ def fit_light(
     *,
     mask: Bool[ArrayLike, "*pixels"] | None = None,
     weights: Float[ArrayLike, "*pixels"] | None = None,
+    materials: Int[ArrayLike, "*pixels"] | None = None,
     prior: Literal["probes"] | Float[ArrayLike, " bands"] | None = "probes",
     noise: float | None = None,
     loss: Loss = "squares",
-    window: Literal["none", "hann", "lanczos", "zonal-sinc"] = "none",
+    nonnegative: Positive | None = None,
+    window: Window = "none",
     tolerance: float | None = None,
     max_steps: int = 100,
     throw: bool = True,
@@ -60,6 +62,10 @@ def fit_light(
     - `degree`: of the light; 2 is what a diffuse surface without shadows can tell.
     - `mask`: False where nothing was observed. `weights`: one over the expected error, at least 0.
       Where either is zero, or a normal is not finite or zero, observed may hold any number.
+    - `materials`: a number 0, 1, … for each place, where colors are not known: one unknown albedo
+      for each material, in turn with the light, from gray on. Shading tells color times light
+      alone, so the mean of the colors over the pixels, by their squared weights, is `albedo`, a
+      number or (3,): scale light and colors to what else you know.
     - `prior`: `"probes"`, `light_variances`; or variances of your own of the bands 1, 2, …, as many
       as there are unknown bands, at least `degree`; or None for least squares alone.
     - `noise`: the standard deviation σ of what was observed at weight 1. By default it is
@@ -67,19 +73,25 @@ def fit_light(
     - `loss`: `"squares"`; or, against highlights and shadows that the surface does not account
       for, `"huber"` or `"cauchy"` of a pixel's length of error, with the thresholds 1.345 σ and
       2.385 σ. Iterated reweighting, from squares on; σ by the median unless given.
-    - `window`: `harmonics.window` to multiply the light by in the end.
-    - `tolerance`, `max_steps`, `throw`: of the reweighting, on the light relative to its length;
-      1e-6, and √ε in float32, by default.
+    - `nonnegative`: keeps `"irradiance"` in 500 directions, or the `"light"` itself in at least as
+      many, from being negative, in the nearest way as the fit sees it. Real irradiance never is;
+      light cut to a low degree often is, beside the true one.
+    - `window`: to multiply the light by in the end: one of `harmonics.window`, or `"irradiance"` or
+      `"light"`, the least of `harmonics.dering` that is needed there, the same for all channels.
+    - `tolerance`, `max_steps`, `throw`: of what is iterated: weights of `loss`, logarithms of
+      colors, coordinates of `nonnegative`; 1e-6, and √ε in float32, by default.
 
     **Returns** a `RecoveredLight` with the light (3, K) in the surface's dtype. Its `confidence` is
     the posterior's, σ and the mean light taken as known: it tells honestly what is unseen as far as
     the light is one like the probes. Without a prior what is not determined is 0, with an infinite
     deviation. `determined` tells coefficient by coefficient what the data decided. Normals alone
-    tell nothing of odd bands from 3 on.
+    tell nothing of odd bands from 3 on. `statistics.at_bound` tells that `nonnegative` had to act;
+    the confidence does not know of it. That of unknown materials is the light's, colors included.
 
-    Differentiable in observed, albedo, weights and the surface where `loss` is `"squares"`: the
-    value, with an estimated σ taken as a constant; the rest of the result is one. `jit` and `vmap`
-    as you like.
+    Differentiable in observed, albedo, weights and the surface, for `loss="squares"` without
+    `nonnegative` or `materials`: the value, with an estimated σ taken as a constant; all else in
+    the result is one. Otherwise a derivative raises `NotImplementedError`. `jit` and `vmap` as you
+    like.
 
     Raises `ValueError` for shapes that do not fit, and, where values are known, for data that are
     not finite, all zero, or weighted by less than 0.
@@ -99,8 +111,10 @@ def fit_light(
     """
     degree = check_degree(degree)
     check_solver(tolerance, max_steps, throw)
-    check_choice("loss", loss, ("squares", "huber", "cauchy"))
-    check_choice("window", window, _WINDOWS)
+    check_choice("loss", loss, get_args(Loss))
+    check_choice("window", window, get_args(Window))
+    if nonnegative is not None:
+        check_choice("nonnegative", nonnegative, get_args(Positive))
     if noise is not None:
         noise = check_number("noise", noise, above=0.0)
     given = isinstance(surface, Transfer)
@@ -112,23 +126,47 @@ def fit_light(
     variances = _variances(prior, degree, surface.degree if given else max(degree, _BANDS))
     rows = as_rows(observed, surface, albedo, weights, mask, 0)
     dtype = rows.observed.dtype
+    labels, count = None, 0
+    if materials is not None:
+        labels, count = _labels(materials, np.shape(observed)[:-1])
+        if rows.albedo.shape not in ((), (3,)) or loss != "squares":
+            raise ValueError(
+                "expected albedo as a number or (3,) and loss as 'squares' with materials, got "
+                f"shape {rows.albedo.shape} and {loss!r}"
+            )
     default = max(1e-6, float(jnp.finfo(dtype).eps) ** 0.5)
+    options = Options(
+        degree=degree,
+        given=given,
+        loss=loss,
+        positive=nonnegative,
+        window=window,
+        materials=count,
+        tolerance=default if tolerance is None else tolerance,
+        max_steps=max_steps,
+    )
     recovered = _fit(
         rows.observed,
         rows.transfer.coefficients if given else rows.transfer.normals,
         rows.albedo,
         rows.weights,
+        labels,
         None if noise is None else jnp.asarray(noise, dtype),
         variances,
-        degree=degree,
-        given=given,
-        loss=loss,
-        kind=window,
-        tolerance=default if tolerance is None else tolerance,
-        max_steps=max_steps,
+        options,
     )
     check_end(recovered, "the light was", throw=throw)
     return recovered
+
+
+def _labels(materials: Any, places: tuple[int, ...]) -> tuple[Int[np.ndarray, " v"], int]:
+    """Numbers of the materials, and how many there are."""
+    given = as_host_integer(materials, "materials")
+    if given.shape != places:
+        raise ValueError(f"expected materials {places}, got shape {given.shape}")
+    if given.size and not 0 <= given.min() <= given.max() < given.size:
+        raise ValueError(f"materials must be numbered 0, 1, …, got {given.min()} to {given.max()}")
+    return given.reshape(-1).astype(np.int32), int(given.max(initial=0)) + 1
 
 
 def _variances(prior: Any, degree: int, most: int) -> Float[np.ndarray, " bands"] | None:
@@ -150,8 +188,6 @@ def _variances(prior: Any, degree: int, most: int) -> Float[np.ndarray, " bands"
 
 
 @eqx.filter_jit
-def _fit(observed, rows, albedo, weights, noise, variances, **options) -> RecoveredLight:
-    def fit(*arrays):
-        return recover(*arrays, **options)
-
-    return everywhere(fit, observed, rows, albedo, weights, noise, variances)
+def _fit(*arguments) -> RecoveredLight:
+    *data, options = arguments
+    return everywhere(functools.partial(recover, options=options), *data)

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,13 +12,29 @@ from jaxtyping import Array, Float
 
 from .._core.linalg import einsum, matmul
 from .._core.xla import in_blocks
-from ..harmonics import clamped_cosine, convolve, degrees, evaluate, num_coefficients, window
+from ..harmonics import (
+    clamped_cosine,
+    convolve,
+    degrees,
+    dering,
+    evaluate,
+    num_coefficients,
+    softening,
+    window,
+)
+from ..sphere import fibonacci
+from ._light_materials import solve_colored
 from ._light_result import RecoveredLight
 from ._light_solve import Solution, compress_rows, solve_plain, solve_with_prior
+from ._nonnegative import nonnegative
 from ._result import Confidence, Statistics
 
 Loss = Literal["squares", "huber", "cauchy"]
+Positive = Literal["irradiance", "light"]
+Window = Literal["none", "hann", "lanczos", "zonal-sinc", "positive", "irradiance", "light"]
 
+# Directions, at least, in which a light or its irradiance is kept from being negative.
+_DIRECTIONS = 500
 # Thresholds of 95 % efficiency on Gaussian errors, in these' deviations, and the median of the
 # length of three such errors over √3.
 _HUBER, _CAUCHY, _MEDIAN = 1.345, 2.385, 0.888
@@ -28,10 +44,23 @@ _SHARES = {
 }
 
 
+class Options(NamedTuple):
+    """Options of `fit_light` that XLA must know."""
+
+    degree: int
+    given: bool  # rows are transfer coefficients, not normals
+    loss: Loss
+    positive: Positive | None
+    window: Window
+    materials: int
+    tolerance: float
+    max_steps: int
+
+
 def recover(
-    observed, rows, albedo, weights, noise, variances, *, degree, given, loss, kind, **iteration
+    observed, rows, albedo, weights, materials, noise, variances, *, options: Options
 ) -> RecoveredLight:
-    dtype = observed.dtype
+    dtype, degree, given = observed.dtype, options.degree, options.given
     bands = degree if variances is None else len(variances)
     columns = _columns(bands, given)
     relative = None
@@ -42,57 +71,87 @@ def recover(
     def make(rows):
         if given:
             return rows[:, columns]
-        cosine = clamped_cosine(bands).astype(dtype)
         up = jnp.asarray([[0.0, 0.0, 1.0]], dtype)
         fine = jnp.all(jnp.isfinite(rows), axis=1) & jnp.any(rows != 0, axis=1)
-        return convolve(evaluate(jnp.where(fine[:, None], rows, up), bands), cosine)[:, columns]
+        return _irradiance_rows(jnp.where(fine[:, None], rows, up), bands)[:, columns]
 
-    def solve(observed, rows, albedo, trust) -> tuple[Solution, Array]:
+    def solve(operator, target, count, scale) -> Solution:
+        level = None if noise is None else noise / scale
+        if relative is None:
+            return solve_plain(operator, target, count, level)
+        return solve_with_prior(operator, target, relative[columns], count, level)
+
+    def solve_rows(observed, rows, albedo, trust) -> tuple[Solution, Array]:
         small = compress_rows(observed, rows, albedo, trust, make)
         operator = jnp.broadcast_to(small.operator, (3, *small.operator.shape[1:])) / small.scale
         count = jnp.sum(trust > 0).astype(dtype)
-        level = None if noise is None else noise / small.scale
-        if relative is None:
-            return solve_plain(operator, small.target, count, level), small.scale
-        found = solve_with_prior(operator, small.target, relative[columns], count, level)
-        return found, small.scale
+        return solve(operator, small.target, count, small.scale), small.scale
 
     data = jax.lax.stop_gradient((observed, rows, albedo))
     trust = jax.lax.stop_gradient(weights)
-    if loss == "squares":
-        found, scale = solve(*data, trust)
-        result, steps = optx.RESULTS.successful, jnp.ones((), jnp.int32)
+    iteration = {"tolerance": options.tolerance, "max_steps": options.max_steps}
+    result, steps, colors = optx.RESULTS.successful, jnp.ones((), jnp.int32), None
+    if options.materials:
+        ended = solve_colored(
+            *data, trust, materials, make, solve, count=options.materials, **iteration
+        )
+        found, scale, colors, result, steps = ended
+    elif options.loss == "squares":
+        found, scale = solve_rows(*data, trust)
     else:
 
         def again(share, _):
             """Shares with which pixels count, from those with which they did."""
-            found, scale = solve(*data, trust * jnp.sqrt(share))
+            found, scale = solve_rows(*data, trust * jnp.sqrt(share))
             error = _length(found.light, *data, trust, make)
             level = _level(error, trust) if noise is None else noise
-            return _SHARES[loss](error / level), (found, scale)
+            return _SHARES[options.loss](error / level), (found, scale)
 
         ended = optx.fixed_point(
             again,
-            optx.FixedPointIteration(0.0, iteration["tolerance"]),
+            optx.FixedPointIteration(0.0, options.tolerance),
             jnp.ones_like(trust),
             has_aux=True,
-            max_steps=iteration["max_steps"],
+            max_steps=options.max_steps,
             throw=False,
         )
         found, scale = ended.aux
         result, steps = ended.result, ended.stats["num_steps"]
-    light = found.light
-    if loss == "squares":
-        still = found.light, found.inverse, found.pull
+    light, met = found.light, jnp.zeros((), bool)
+    if options.positive is not None:
+        limits = _limits(options.positive, degree, bands, columns, dtype)
+        light, met, done = nonnegative(light, found.inverse, limits, **iteration)
+        most: Any = optx.RESULTS.nonlinear_max_steps_reached
+        result = optx.RESULTS.where(done, result, most)
+    if options.materials or options.loss != "squares" or options.positive is not None:
+        light = _final(light, observed, rows, albedo, weights)
+    else:
+        still = light, found.inverse, found.pull
         light = _attached(make)(*still, scale, observed, rows, albedo, weights)
     statistics = Statistics(
         steps=steps,
         residual=found.residual,
         agreeing=jnp.ones((), jnp.int32),
         starts=1,
-        at_bound=jnp.zeros((), bool),
+        at_bound=met,
     )
-    return _whole(light, found, scale, relative, columns, degree, kind, result, statistics)
+    return _whole(light, found, scale, relative, columns, options, colors, result, statistics)
+
+
+def _irradiance_rows(directions: Float[Array, "n 3"], bands: int) -> Float[Array, "n k"]:
+    return convolve(evaluate(directions, bands), clamped_cosine(bands).astype(directions.dtype))
+
+
+def _limits(
+    positive: Positive, degree: int, bands: int, columns: np.ndarray, dtype
+) -> Float[Array, "n k"]:
+    """Rows whose products with a light are its values, or its irradiance, in directions."""
+    if positive == "irradiance":
+        return _irradiance_rows(fibonacci(_DIRECTIONS).directions.astype(dtype), bands)[:, columns]
+    count = num_coefficients(degree)
+    directions = fibonacci(max(_DIRECTIONS, 8 * count)).directions.astype(dtype)
+    own = evaluate(directions, degree)[:, columns[columns < count]]
+    return jnp.pad(own, ((0, 0), (0, len(columns) - own.shape[1])))
 
 
 def _columns(bands: int, given: bool) -> np.ndarray:
@@ -112,14 +171,14 @@ def _length(light, observed, rows, albedo, weights, make) -> Float[Array, " v"]:
 def _level(error: Float[Array, " v"], weights: Float[Array, " v"]) -> Float[Array, ""]:
     """Standard deviation of errors most of which are Gaussian."""
     seen = weights > 0
-    half, most = jnp.sum(seen) / 2, jnp.max(jnp.where(seen, error, 0))
+    most = jnp.max(jnp.where(seen, error, 0))
     # By halving, not by sorting: a mesh of devices would have to gather what is sorted.
     span = -math.log(jnp.finfo(error.dtype).eps)
 
     def halve(_, bounds):
         low, high = bounds
         middle = (low + high) / 2
-        few = jnp.sum(seen & (error <= most * jnp.exp(middle))) < half
+        few = 2 * jnp.sum(seen & (error <= most * jnp.exp(middle))) < jnp.sum(seen)
         return jnp.where(few, middle, low), jnp.where(few, high, middle)
 
     start = jnp.full((), -span, error.dtype), jnp.zeros((), error.dtype)
@@ -157,9 +216,30 @@ def _attached(make):
     return attached
 
 
-def _whole(light, found, scale, relative, columns, degree, kind, result, statistics):
+@jax.custom_jvp
+def _final(light, *data):
+    """The light as it is, whose derivatives nobody has written."""
+    return light
+
+
+@_final.defjvp
+def _(primals, tangents):
+    raise NotImplementedError(
+        "fit_light has derivatives for loss='squares' alone, without nonnegative or materials"
+    )
+
+
+def _window(value, kind: Window, degree: int) -> Float[Array, " k"]:
+    """Factors of a window by its name; of `dering`'s by what it is to help, for all channels."""
+    if kind == "irradiance" or kind == "light":
+        _, strength = dering(value, of=kind, shared=True)
+        return softening(strength, degree)
+    return window(kind, degree).astype(value.dtype)
+
+
+def _whole(light, found, scale, relative, columns, options, colors, result, statistics):
     """The answer up to the degree that was asked for, with what was not seen at all."""
-    dtype, count = light.dtype, num_coefficients(degree)
+    dtype, count = light.dtype, num_coefficients(options.degree)
     columns = columns[columns < count]
     kept = len(columns)
     spread = jnp.full((3, count), jnp.inf, dtype)
@@ -168,8 +248,9 @@ def _whole(light, found, scale, relative, columns, degree, kind, result, statist
     variance = found.noise**2
     inner = found.inverse[:, :kept, :kept]
     inner = jnp.where(jnp.isfinite(inner), variance * inner, jnp.inf)
-    factor = window(kind, degree).astype(dtype)
-    value = jnp.zeros((3, count), dtype).at[:, columns].set(light[:, :kept]) * factor[None]
+    value = jnp.zeros((3, count), dtype).at[:, columns].set(light[:, :kept])
+    factor = _window(value, options.window, options.degree)
+    value = value * factor[None]
     known = jnp.zeros((3, count), dtype).at[:, columns].set(found.determined[:, :kept])
     covariance = jnp.zeros((3, count, 3, count), dtype)
     for c in range(3):
@@ -179,6 +260,6 @@ def _whole(light, found, scale, relative, columns, degree, kind, result, statist
     deviation = jnp.sqrt(jnp.maximum(jnp.diagonal(covariance), 0)).reshape(3, count)
     # As found, and not followed where the light is differentiated.
     still = jax.lax.stop_gradient(
-        (statistics, Confidence(covariance, deviation), known, scale * found.noise)
+        (statistics, Confidence(covariance, deviation), known, scale * found.noise, colors)
     )
     return RecoveredLight(value, result, *still)

@@ -13,6 +13,7 @@ class RecoveredLight(Recovered[Float[Array, "3 k"]]):
       deviation the prior's own. The constant coefficient has no prior; it counts as 1. Without a
       prior it is 1, or 0 where nothing determines the coefficient and its deviation is infinite.
     - `noise`: the standard deviation of what was observed, at weight 1, as given or as estimated.
+    - `albedo` (M, 3): the colors of the materials where they were unknown, otherwise None.
 
     **Example**
 
@@ -28,3 +29,4 @@ class RecoveredLight(Recovered[Float[Array, "3 k"]]):
 
     determined: Float[Array, "3 k"]
     noise: Float[Array, ""]
+    albedo: Float[Array, "m 3"] | None

@@ -1,4 +1,4 @@
-"""Linear least squares for a light under a prior, its noise level, and a set of inequalities.
+"""Linear least squares for a light under a prior, and the level of its noise.
 
 All in units in which the weighted data have length 1, on the few rows that hold all of them.
 """
@@ -107,13 +107,17 @@ def solve_with_prior(
     lights taken together (marginal likelihood; restricted, since the mean is free).
     """
     dtype = target.dtype
+    count_of = operator.shape[2]
+    lacking = max(count_of - operator.shape[1], 0)  # of rows, for the SVD to be complete
+    operator = jnp.pad(operator, ((0, 0), (0, lacking), (0, 0)))
+    target = jnp.pad(target, ((0, 0), (0, lacking)))
     widths = jnp.sqrt(variances[1:])
     # The operator is a triangle: its first row alone holds the first coefficient.
     first, rest = operator[:, 0], operator[:, 1:, 1:] * widths[None, None]
     u, d, vt = jnp.linalg.svd(rest, full_matrices=False)
     y = einsum("cri,cr->ci", u, target[:, 1:])
     across = jnp.sum((target[:, 1:] - einsum("cri,ci->cr", u, y)) ** 2)
-    free = 3 * jnp.maximum(count - 1 - d.shape[-1], 0)
+    free = 3 * jnp.maximum(count - count_of, 0)
     head = jnp.where(first[:, 0] == 0, 1, first[:, 0])
     typical = 1 / jnp.sqrt(3 * jnp.maximum(count, 1))  # root mean square of what was observed
 
@@ -162,9 +166,17 @@ def solve_with_prior(
 
     light = jax.vmap(one)(stacked, target)
     residual = jnp.linalg.norm(target - einsum("crk,ck->cr", operator, light))
-    inverse = jax.vmap(lambda matrix: covariance(matrix, jnp.ones((), dtype)))(stacked)
+    # The Hessian's inverse by the singular values: each is added to σ², so that none is too small.
+    along = einsum("cik,ci->cik", vt, 1 / jnp.sqrt((scale[:, None] * d) ** 2 + level**2))
+    along = along * (scale[:, None] * widths[None])[:, None]
+    inner = einsum("cik,cij->ckj", along, along)
+    lever = -einsum("ck,ckj->cj", first[:, 1:], inner) / head[:, None]
+    corner = 1 / head**2 - jnp.sum(lever * first[:, 1:], axis=1) / head
+    top = jnp.concatenate([corner[:, None], lever], axis=1)
+    inverse = jnp.concatenate([lever[..., None], inner], axis=2)
+    inverse = jnp.concatenate([top[:, None], inverse], axis=1)
     inverse = jnp.where(dark[..., None], jnp.inf, inverse)
-    own = level**2 * jnp.diagonal(inverse, axis1=1, axis2=2)
-    known = jnp.concatenate([jnp.ones((3, 1), dtype), 1 - own[:, 1:] / spreads], axis=1)
-    known = jnp.where(dark, 0, jnp.clip(known, 0, 1))
+    own = level**2 * jnp.diagonal(inner, axis1=1, axis2=2) / spreads
+    known = jnp.concatenate([jnp.ones((3, 1), dtype), jnp.clip(1 - own, 0, 1)], axis=1)
+    known = jnp.where(dark, 0, known)
     return Solution(light, inverse, pull, known, level, residual)
