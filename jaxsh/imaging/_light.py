@@ -45,7 +45,6 @@ _SAID = {
     ".npz": (),
     ".npy": (),
 }
-_ELSEWHERE = {".ply": "splats are read by imaging.read_splats"}
 
 
 def read_light(
@@ -127,7 +126,7 @@ def _check_options(
 def _check_suffix(path: Path, what: str) -> None:
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
-        hint = _ELSEWHERE.get(suffix, f"only {FORMATS}")
+        hint = f"splats are for imaging.{what}_splats" if suffix == ".ply" else f"only {FORMATS}"
         raise ValueError(f"{path}: cannot {what} {suffix or 'no extension'}: {hint}")
 
 

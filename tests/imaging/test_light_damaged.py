@@ -108,7 +108,7 @@ def test_what_is_asked_for_is_checked(tmp_path, unchecked):
         read_light(path, which="a")
     with pytest.raises(ValueError, match=r"expected convention as a Convention or a name .*; did"):
         read_light(path, convention="three.json")
-    with pytest.raises(ValueError, match=r"a\.ply: cannot read \.ply: splats are read by imaging"):
+    with pytest.raises(ValueError, match=r"a\.ply: cannot read \.ply: splats are for imaging"):
         read_light(tmp_path / "a.ply")
     with pytest.raises(FileNotFoundError, match=r"b\.json: there is no such light"):
         read_light(tmp_path / "b.json")
