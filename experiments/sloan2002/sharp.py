@@ -31,8 +31,10 @@ from .sharp_reference import (
     references,
 )
 
-_SCANS = {"threshold": (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 48.0),
-          "largest": (0.01, 0.03, 0.06, 0.1, 0.2, 0.4, 1.0)}  # fmt: skip
+_SCANS = {
+    "threshold": (2.0, 4.0, 8.0, 16.0, 48.0),
+    "largest": (0.01, 0.03, 0.1, 0.3, 1.0),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +59,8 @@ class Sharp:
     """vertices of each mesh that have a reference"""
     size: int = 480
     """height of the pictures, in pixels; 0 draws none"""
+    pictures: int = 1
+    """how many of the probes are drawn, on the first mesh"""
     picture_directions: int = 2048
     """directions of the pictures' reference, drawn by the probe's light"""
 
@@ -266,7 +270,7 @@ def _draw(
         "below a glossy one. Without suns black and colored patches are light below zero"
     )
     raster = imaging.rasterize(subject.mesh, subject.camera, samples=2)
-    for probe, image in probes.items():
+    for probe, image in list(probes.items())[: config.pictures]:
         columns = {"harmonics alone": lights[probe, 0]}
         for count in config.counts:
             columns[f"{count} sun{'s' * (count > 1)}"] = lights[probe, count]

@@ -85,10 +85,10 @@ def split_sun(
     largest = check_number("largest", largest, above=0.0, most=4 * np.pi)
     least = check_number("least", least, least=0.0, most=1.0)
 
-    # Half precision ends at 65,504, which is dark for a sun.
-    dtype = image.dtype if image.dtype.itemsize > 2 else np.dtype(np.float32)
     coarse = Coarse.of(image)
-    rest = np.array(image)
+    rest = np.array(image, jax.dtypes.canonicalize_dtype(image.dtype))
+    # Half precision ends at 65,504, which is dark for a sun.
+    dtype = rest.dtype if rest.dtype.itemsize > 2 else np.dtype(np.float32)
     sources = []
     for region in _brightest(coarse, count, threshold, largest, least):
         source = _take(rest, coarse, region)

@@ -34,7 +34,7 @@ def test_a_sun_split_off_is_worth_it(tmp_path):
         assert max(parts) / 3 < beside["error"] < sum(parts) + 2 * beside["reference_error"]
         assert 50 < beside["sun_light"] < 100
     scanned = {(r["scan"], r["value"]): r["scan_error"] for r in rows if "scan" in r}
-    assert len(scanned) == 16
+    assert len(scanned) == 10
     assert scanned["threshold", 4.0] == scanned["largest", 0.1] == errors["shadowed", 1, 4]["error"]
     assert scanned["largest", 0.01] > scanned["largest", 0.1]
     for picture in ("studio.png", "thresholds.png"):
