@@ -1,8 +1,9 @@
 """Compact sources of light apart from the rest: what they are, their rays, their coefficients."""
 
-from typing import Any
+import functools
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
@@ -85,22 +86,14 @@ class Suns(eqx.Module):
         >>> sphere.Suns([[0.0, 0.0, 1.0]], [0.1], [[1.0, 1.0, 1.0]]).rays(64).shape
         (1, 64, 3)
         """
-        dtype = self.direction.dtype
         if self.shape is None:
-            local = _spiral(check_size("count", _RAYS if count is None else count))
-            within = self.solid_angle.astype(dtype)[:, None] / (2 * np.pi)  # 1 - cos of the rim
-            area = jnp.asarray(local[:, 2], dtype)[None] * within
-            radius = jnp.sqrt(jnp.maximum(area * (2 - area), 0))
-            flat = jnp.asarray(local[:, :2], dtype)[None] * radius[..., None]
-            local = jnp.concatenate([flat, (1 - area)[..., None]], axis=-1)
-        else:
-            suns, has, _ = self.shape.shape
-            count = has if count is None else check_size("count", count)
-            if has % count:
-                raise ValueError(f"count must divide the {has} vectors of the shape, got {count}")
-            groups = self.shape.astype(dtype).reshape(suns, count, has // count, 3)
-            local = _unit(groups.sum(axis=2)) if count < has else groups[:, :, 0]
-        return einsum("sij,snj->sni", local_frames(self.direction), local)
+            count = check_size("count", _RAYS if count is None else count)
+            return _disc_rays(self.direction, self.solid_angle, count)
+        has = self.shape.shape[1]
+        count = has if count is None else check_size("count", count)
+        if has % count:
+            raise ValueError(f"count must divide the {has} vectors of the shape, got {count}")
+        return _shaped_rays(self.direction, self.shape, count)
 
     def harmonics(self, degree: int) -> Float[Array, "3 k"]:
         """Project all of the sources onto the basis: coefficients of their light together.
@@ -115,12 +108,7 @@ class Suns(eqx.Module):
         >>> round(float(moon.harmonics(degree=1)[0, 0] / 6e-5), 3)  # √(1/4π)
         0.282
         """
-        degree = check_degree(degree)
-        if self.shape is None:
-            spread = convolve(evaluate(self.direction, degree), disc(self.solid_angle, degree))
-            return einsum("sc,sk->ck", self.radiance, spread.astype(self.radiance.dtype))
-        spread = evaluate(self.rays(), degree).mean(axis=1)
-        return einsum("sc,sk->ck", self.irradiance, spread.astype(self.radiance.dtype))
+        return _harmonics(self, check_degree(degree))
 
     def rotate(self, rotation: Float[ArrayLike, "3 3"]) -> "Suns":
         """Turn all of the sources by a rotation matrix R, as `harmonics.rotate` turns a light.
@@ -138,21 +126,57 @@ class Suns(eqx.Module):
         turn = checked_rotation(rotation).astype(self.direction.dtype)
         if turn.ndim != 2:
             raise ValueError(f"expected rotation (3, 3), got shape {turn.shape}")
-        direction = einsum("ij,sj->si", turn, self.direction)
-        shape = self.shape
-        if shape is not None:
-            back = einsum(
-                "sji,jk,skl->sil", local_frames(direction), turn, local_frames(self.direction)
-            )
-            shape = einsum("sij,snj->sni", back.astype(shape.dtype), shape)
-        return Suns(direction, self.solid_angle, self.radiance, shape)
+        return _rotated(self, turn)
+
+
+@functools.partial(jax.jit, static_argnums=2)
+def _disc_rays(direction, solid_angle, count: int):
+    local = _spiral(count)
+    within = solid_angle.astype(direction.dtype)[:, None] / (2 * np.pi)  # 1 - cos of the rim
+    area = jnp.asarray(local[:, 2], direction.dtype)[None] * within
+    radius = jnp.sqrt(jnp.maximum(area * (2 - area), 0))
+    flat = jnp.asarray(local[:, :2], direction.dtype)[None] * radius[..., None]
+    return _placed(direction, jnp.concatenate([flat, (1 - area)[..., None]], axis=-1))
+
+
+@functools.partial(jax.jit, static_argnums=2)
+def _shaped_rays(direction, shape, count: int):
+    suns, has, _ = shape.shape
+    groups = shape.astype(direction.dtype).reshape(suns, count, has // count, 3)
+    local = _unit(groups.sum(axis=2)) if count < has else groups[:, :, 0]
+    return _placed(direction, local)
+
+
+def _placed(direction, local):
+    return einsum("sij,snj->sni", local_frames(direction), local)
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _harmonics(suns: Suns, degree: int):
+    if suns.shape is None:
+        spread = convolve(evaluate(suns.direction, degree), disc(suns.solid_angle, degree))
+        return einsum("sc,sk->ck", suns.radiance, spread.astype(suns.radiance.dtype))
+    spread = evaluate(suns.rays(), degree).mean(axis=1)
+    return einsum("sc,sk->ck", suns.irradiance, spread.astype(suns.radiance.dtype))
+
+
+@jax.jit
+def _rotated(suns: Suns, turn):
+    direction = einsum("ij,sj->si", turn, suns.direction)
+    shape = suns.shape
+    if shape is not None:
+        before, after = local_frames(suns.direction), local_frames(direction)
+        turned = einsum("sji,jk,skl->sil", after, turn, before).astype(shape.dtype)
+        shape = einsum("sij,snj->sni", turned, shape)
+    return Suns(direction, suns.solid_angle, suns.radiance, shape)
 
 
 def _unit(vectors: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3"]:
     return vectors / jnp.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def local_frames(direction: Float[Array, "s 3"]) -> Float[Any, "s 3 3"]:
+@jax.jit
+def local_frames(direction: Float[Array, "s 3"]) -> Float[Array, "s 3 3"]:
     """Rotations whose last column is the direction: Duff et al. 2017, "Building an orthonormal
     basis, revisited", smooth in each of the hemispheres about the z axis.
     """

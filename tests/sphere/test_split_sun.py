@@ -34,7 +34,7 @@ def angle(a, b):
     return np.arccos(np.clip(np.sum(np.asarray(a) * np.asarray(b), axis=-1), -1, 1))
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "sun",
     [(0.48, 0.6, 0.64), (0.8, 0.001, -0.6), (0, 0, 1), (0.01, 0.02, -0.99975)],

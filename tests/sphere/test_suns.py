@@ -38,7 +38,10 @@ def test_many_rays_are_the_disc(direction):
     np.testing.assert_allclose(suns.irradiance, [[0.3, 0.6, 0.15]], rtol=1e-15)
 
 
-@pytest.mark.parametrize(("dtype", "error"), [(np.float64, 2e-15), (np.float32, 2e-6)])
+@pytest.mark.parametrize(
+    ("dtype", "error"),
+    [(np.float64, 2e-15), pytest.param(np.float32, 2e-6, marks=pytest.mark.slow)],
+)
 def test_turned_suns_have_turned_coefficients(dtype, error, rng):
     suns, turn = shaped(rng, dtype), rotation(rng)
     found = suns.rotate(turn)
