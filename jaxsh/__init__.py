@@ -22,6 +22,7 @@ if _TYPE_CHECKING:
     from . import sky as sky
     from . import sphere as sphere
     from . import transfer as transfer
+    from . import viewer as viewer
     from ._check import Verdict as Verdict
     from ._check import check as check
 
@@ -38,6 +39,7 @@ __all__ = [
     "sky",
     "sphere",
     "transfer",
+    "viewer",
 ]
 __version__ = "0.1.0"
 

@@ -29,6 +29,7 @@ FLOORS = {
     "midrange": 4,
     "adaptive": 4,
     "inverse": 5,
+    "viewer": 6,
 }
 # Private files that another module may import.
 DOORS = {

@@ -9,7 +9,10 @@ import tarfile
 import zipfile
 from pathlib import Path
 
-WHEEL_NEEDS = {"jaxsh/__init__.py", "jaxsh/py.typed", "jaxsh/sky/preetham.npz"}
+WHEEL_NEEDS = {
+    *("jaxsh/__init__.py", "jaxsh/py.typed", "jaxsh/sky/preetham.npz"),
+    *("jaxsh/viewer/js/page.html", "jaxsh/viewer/js/style.css", "jaxsh/viewer/js/renderer.js"),
+}
 # The source builds the documentation and runs its own tests.
 SOURCE_NEEDS = {
     *("CITATION.cff", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "Makefile", "mkdocs.yml"),

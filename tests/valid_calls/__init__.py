@@ -14,6 +14,7 @@ from . import (
     sky,
     sphere,
     transfer,
+    viewer,
 )
 from .shared import Call, K
 
@@ -31,6 +32,7 @@ _MODULES = {
     "sky": sky,
     "sphere": sphere,
     "transfer": transfer,
+    "viewer": viewer,
 }
 
 

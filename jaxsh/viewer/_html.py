@@ -1,0 +1,87 @@
+"""A page with a mesh to relight, in one file."""
+
+import base64
+import gzip
+import html
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from string import Template
+
+from jaxtyping import ArrayLike, Float, Int
+
+from .._core.checks import as_path
+from ..imaging import Camera
+from ..transfer import Transfer
+from ._scene import make_scene
+from ._script import script, text
+
+
+def export_html(
+    path: str | os.PathLike[str],
+    transfer: Transfer,
+    light: Float[ArrayLike, "*lights 3 k"],
+    faces: Int[ArrayLike, "f 3"],
+    albedo: Float[ArrayLike, "..."] = 0.8,
+    *,
+    camera: Camera | None = None,
+    exposure: float | None = None,
+    names: Sequence[str] | None = None,
+    title: str = "jaxsh",
+) -> Path:
+    """Write a mesh to one HTML file, in which it is seen from all sides and relit.
+
+    The file works in every browser with WebGL2, without a network and without a server, also from
+    a mail or an archive. Dragging orbits; dragging with Shift turns the light, exactly, for its
+    coefficients are rotated; sliders set exposure, intensity and the degree at which the light is
+    cut. What is shown is `transfer.shade_diffuse` of the light, carried over the faces as by
+    `imaging.interpolate`, then `imaging.tone_map(…, exposure)`. Transfer is rounded to 16 bits,
+    each harmonic in steps of 1/32767 of its largest coefficient.
+
+    **Arguments**
+
+    - `path`: of the file, which is replaced. Missing folders are made.
+    - `transfer`: of the V vertices of a mesh, as from `transfer.bake` or `unshadowed`; its
+      positions are the mesh's.
+    - `light`: coefficients (3, K), or (n, 3, K) for several that a menu chooses from; of degree 10
+      and the transfer's at most. What the transfer has beyond the light's degree is not written.
+    - `faces`: (f, 3), the mesh's.
+    - `albedo`: a number, RGB (3,), or per vertex (V, 1) or (V, 3).
+    - `camera`: where the picture starts; by default `imaging.Camera.facing` the mesh. A window of
+      another shape than its picture shows more beside or above it, never less.
+    - `exposure`: the factor of linear radiance from which the exposure's slider counts; by default
+      `imaging.auto_exposure` of all vertices under the first light.
+    - `names`: of the lights in the menu.
+    - `title`: of the page.
+
+    **Returns** the path. Runs on the host. Raises `ValueError` for shapes and degrees that do not
+    fit, for values that are not finite and for an albedo below 0, `TypeError` for objects of
+    another class, and `OSError` where the file cannot be written.
+
+    **Example**
+
+    >>> import pathlib, tempfile
+    >>> from jaxsh import geometry, imaging, sphere, transfer, viewer
+    >>> mesh = geometry.knot(300)
+    >>> made = transfer.unshadowed(mesh.vertices, mesh.normals, degree=2)
+    >>> light = sphere.project_lat_long(imaging.studio(16, 32), degree=2)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = viewer.export_html(pathlib.Path(folder) / "knot.html", made, light, mesh.faces)
+    ...     page.name, page.stat().st_size < 100_000
+    ('knot.html', True)
+    """
+    path = as_path(path)
+    scene = make_scene(transfer, light, faces, albedo, camera, exposure, names, title)
+    arrays = base64.b64encode(gzip.compress(scene.arrays, mtime=0)).decode("ascii")
+    page = Template(text("page.html")).substitute(
+        title=html.escape(title),
+        style=text("style.css"),
+        # No "</script>" from a name ends the element.
+        header=json.dumps(scene.header).replace("<", "\\u003c"),
+        arrays=arrays,
+        script=script("page"),
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(page, encoding="utf-8")
+    return path

@@ -1,0 +1,187 @@
+"""Packs what a page is sent: a header of numbers and names, and the arrays of a mesh."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, Float, Int
+
+from .._core.checks import (
+    as_finite,
+    as_host_float,
+    as_host_integer,
+    check_all,
+    check_coefficients,
+    check_faces,
+    check_finite,
+    check_number,
+    check_type,
+)
+from ..geometry import Mesh
+from ..harmonics import num_coefficients
+from ..imaging import Camera, auto_exposure
+from ..transfer import Transfer
+
+# Degrees that are tried in a browser; WebGL2 promises registers for a few more.
+MOST_DEGREE = 10
+# WebGL2 promises textures of 2048 texels along a side.
+_ROW, _MOST_ROWS = 1024, 2048
+_MOST_CODE = 32767  # of int16
+
+
+class Scene(NamedTuple):
+    """Holds a header, which JSON takes, and the bytes of the arrays in the order of `scene.js`."""
+
+    header: dict[str, Any]
+    arrays: bytes
+
+
+class Codes(NamedTuple):
+    """Holds coefficients as integers: `codes` times `scales` are the coefficients."""
+
+    codes: np.ndarray  # int16 (v, k)
+    scales: np.ndarray  # float64 (k,)
+
+
+def make_scene(
+    transfer: Transfer,
+    light: Float[ArrayLike, "*lights 3 k"],
+    faces: Int[ArrayLike, "f 3"],
+    albedo: Float[ArrayLike, "..."],
+    camera: Camera | None,
+    exposure: float | None,
+    names: Sequence[str] | None,
+    title: str,
+) -> Scene:
+    """Check all and pack it; raises `ValueError` or `TypeError` for what does not fit."""
+    check_type("transfer", transfer, Transfer)
+    lights = checked_lights(light, transfer.degree)
+    count = transfer.num_points
+    if count > _ROW * _MOST_ROWS:
+        raise ValueError(f"expected at most {_ROW * _MOST_ROWS} points of transfer, got {count}")
+    corners = _checked_faces(faces, count)
+    shared, codes = _packed_albedo(albedo, count)
+    if exposure is not None:
+        exposure = check_number("exposure", exposure, above=0.0)
+    check_type("title", title, str)
+    positions = np.asarray(transfer.positions, np.float32)
+    check_finite("positions of the transfer", positions, wait=True)
+    if camera is None:
+        camera = Camera.facing(
+            Mesh(jnp.asarray(positions), jnp.asarray(corners), jnp.asarray(positions))
+        )
+    check_type("camera", camera, Camera)
+    coefficients = np.asarray(transfer.vectors(lights.shape[-1]))
+    rounded = quantized(coefficients)
+    if exposure is None:
+        # What the whole mesh sends out stands for what a picture shows of it.
+        radiance = (
+            coefficients @ lights[0].T.astype(coefficients.dtype) * np.asarray(albedo) / np.pi
+        )
+        exposure = float(auto_exposure(jnp.asarray(radiance[None])))
+    rows = math.ceil(count / _ROW)
+    layers = in_layers(rounded.codes, rows)
+    middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
+    header = {
+        "title": title,
+        "names": checked_names(names, len(lights)),
+        "lights": lights.tolist(),
+        "degree": math.isqrt(lights.shape[-1]) - 1,
+        "exposure": exposure,
+        "albedo": shared,
+        "camera": _facts(camera),
+        "middle": middle.tolist(),
+        "radius": float(np.linalg.norm(positions - middle, axis=1).max()),
+        "scales": rounded.scales.tolist(),
+        "numVertices": count,
+        "numFaces": len(corners),
+        "rowLength": _ROW,
+        "rows": rows,
+        "layers": len(layers),
+        "albedoPerVertex": codes is not None,
+    }
+    arrays = [positions.astype("<f4"), corners.astype("<u4"), layers.astype("<i2")]
+    arrays += [] if codes is None else [codes.astype("<u2")]
+    return Scene(header, b"".join(array.tobytes() for array in arrays))
+
+
+def checked_lights(light: Any, degree: int) -> np.ndarray:
+    """Lights as float64 (n, 3, K); raises `ValueError` for others, and above a degree."""
+    array = as_host_float(light, "light").astype(np.float64)
+    if array.ndim not in (2, 3) or array.shape[-2] != 3 or array.size == 0:
+        raise ValueError(f"expected light (3, K) or (n, 3, K), got shape {array.shape}")
+    most = min(degree, MOST_DEGREE)
+    if (own := check_coefficients("light", array)) > most:
+        whose = "the transfer's" if degree <= MOST_DEGREE else "what the viewer shades with"
+        raise ValueError(
+            f"the light's degree {own} is above {whose}, {most}; cut it to "
+            f"light[..., :{num_coefficients(most)}]"
+        )
+    check_finite("light", array, wait=True)
+    return array.reshape(-1, *array.shape[-2:])
+
+
+def checked_names(names: Any, count: int) -> list[str]:
+    """A name for each light; raises unless there are as many."""
+    if names is None:
+        return [f"Light {i + 1}" for i in range(count)]
+    check_all("names", names, str)
+    if len(names) != count:
+        raise ValueError(f"expected {count} names, one for each light, got {len(names)}")
+    return list(names)
+
+
+def quantized(coefficients: np.ndarray) -> Codes:
+    """Round each column to integers in steps of 1/32767 of its largest magnitude."""
+    values = coefficients.astype(np.float64)
+    if bad := int((~np.isfinite(values)).sum()):
+        raise ValueError(f"transfer must be finite, got {bad} coefficients that are not")
+    scales = np.abs(values).max(axis=0) / _MOST_CODE
+    codes = np.rint(values / np.where(scales > 0, scales, 1))
+    return Codes(codes.astype(np.int16), scales)
+
+
+def in_layers(codes: np.ndarray, rows: int) -> np.ndarray:
+    """Lay codes (v, k) out as texels of four coefficients: (layers, rows · 1024, 4)."""
+    count, width = codes.shape
+    layers = math.ceil(width / 4)
+    texels = np.zeros((rows * _ROW, layers * 4), np.int16)
+    texels[:count, :width] = codes
+    return texels.reshape(rows * _ROW, layers, 4).swapaxes(0, 1)
+
+
+def _checked_faces(faces: Any, count: int) -> np.ndarray:
+    array = as_host_integer(faces, "faces")
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
+        raise ValueError(f"expected faces (f, 3), at least one, got shape {array.shape}")
+    check_faces("the mesh", array, count)
+    return array.astype(np.int32)
+
+
+def _packed_albedo(albedo: Any, count: int) -> tuple[list[float], np.ndarray | None]:
+    """Split an albedo into RGB that all vertices share, and 16-bit codes (v, 3) of [0, 1] of it.
+
+    Raises `ValueError` for shapes that do not fit and values that are negative or not finite.
+    """
+    array = np.asarray(as_finite(albedo, "albedo", least=0.0, wait=True), np.float64)
+    if array.shape not in ((), (3,), (count, 1), (count, 3)):
+        raise ValueError(
+            f"expected albedo as a number, (3,), ({count}, 1) or ({count}, 3), got shape "
+            f"{array.shape}"
+        )
+    if array.ndim < 2:
+        return np.broadcast_to(array, 3).tolist(), None
+    largest = array.max(axis=0)
+    codes = np.rint(array / np.where(largest > 0, largest, 1) * 65535).astype(np.uint16)
+    return np.broadcast_to(largest, 3).tolist(), np.broadcast_to(codes, (count, 3))
+
+
+def _facts(camera: Camera) -> dict[str, Any]:
+    vectors = {
+        name: np.asarray(getattr(camera, name), np.float64).tolist()
+        for name in ("position", "target", "up")
+    }
+    aspect = camera.width / camera.height
+    return vectors | {"fovY": float(camera.fov_y), "aspect": aspect}

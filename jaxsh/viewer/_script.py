@@ -1,0 +1,25 @@
+"""The page's own files, and its ES modules as one."""
+
+import functools
+import re
+from importlib.resources import files
+
+# Each after those that it imports from.
+_MODULES = ("harmonics", "vectors", "scene", "controls", "renderer", "viewer")
+_IMPORT = re.compile(r"^import\s[^;]*?from\s+\"(\./\w+)\.js\";\n", re.MULTILINE)
+
+
+@functools.cache
+def text(name: str) -> str:
+    """Read a file of the folder `js`."""
+    return files(__package__).joinpath("js", name).read_text("utf-8")
+
+
+@functools.cache
+def script(last: str) -> str:
+    """Join the modules, and `last` behind them, into one that imports and exports nothing.
+
+    All their names then stand beside each other: no two modules may use one for two things.
+    """
+    parts = [_IMPORT.sub("", text(f"{name}.js")) for name in (*_MODULES, last)]
+    return "\n".join(re.sub(r"^export (?!default)", "", part, flags=re.MULTILINE) for part in parts)

@@ -1,0 +1,106 @@
+"""A mesh to relight in a notebook."""
+
+import functools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from jaxtyping import ArrayLike, Float, Int
+
+from .._core.checks import check_size
+from ..imaging import Camera
+from ..transfer import Transfer
+from ._scene import Scene, checked_lights, make_scene
+from ._script import script, text
+
+if TYPE_CHECKING:
+    from anywidget import AnyWidget
+
+
+def view(
+    transfer: Transfer,
+    light: Float[ArrayLike, "*lights 3 k"],
+    faces: Int[ArrayLike, "f 3"],
+    albedo: Float[ArrayLike, "..."] = 0.8,
+    *,
+    camera: Camera | None = None,
+    exposure: float | None = None,
+    names: Sequence[str] | None = None,
+    title: str = "jaxsh",
+    height: int = 480,
+) -> "AnyWidget":
+    """Show a mesh in a notebook, to be seen from all sides and relit there and from Python.
+
+    What is shown, and how it is handled, is as in the page that `export_html` writes. The mesh is
+    sent once, when the widget is first drawn, and is not saved with the notebook. Assigning to the
+    widget's `light` relights it: 3 K numbers are sent. Needs the package anywidget (`pip install
+    'jaxsh[viewer]'`).
+
+    **Arguments** are those of `export_html`, but for the path; and `height` in pixels.
+
+    **Returns** the widget. Its `light` is (3, K) or (n, 3, K), as many lights as at first and of
+    their degree. Runs on the host. Raises as `export_html` does, and `ImportError` without
+    anywidget.
+
+    **Example**
+
+    >>> from jaxsh import geometry, imaging, sphere, transfer, viewer
+    >>> mesh = geometry.knot(300)
+    >>> made = transfer.unshadowed(mesh.vertices, mesh.normals, degree=2)
+    >>> light = sphere.project_lat_long(imaging.studio(16, 32), degree=2)
+    >>> try:
+    ...     widget = viewer.view(made, light, mesh.faces)
+    ...     widget.light = 2 * light
+    ... except ImportError as error:  # without anywidget
+    ...     assert "anywidget" in str(error)
+    """
+    height = check_size("height", height, 100)
+    scene = make_scene(transfer, light, faces, albedo, camera, exposure, names, title)
+    return _widget_class()(scene, height)
+
+
+@functools.cache
+def _widget_class() -> Any:
+    try:
+        import anywidget
+        import traitlets
+    except ImportError as error:
+        raise ImportError(
+            "a viewer in a notebook needs the package anywidget: pip install 'jaxsh[viewer]', or "
+            "write a page by export_html"
+        ) from error
+
+    class ViewerWidget(anywidget.AnyWidget):
+        """Holds the lights; the mesh goes to each page that asks for it."""
+
+        _esm = script("widget")
+        _css = text("style.css")
+        lights = traitlets.List().tag(sync=True)
+        height = traitlets.Int().tag(sync=True)
+
+        def __init__(self, scene: Scene, height: int):
+            super().__init__(lights=scene.header["lights"], height=height)
+            self._scene = scene
+            self.on_msg(self._answer)
+
+        def _answer(self, widget, message, buffers):
+            if message == {"kind": "ready"}:
+                header = self._scene.header
+                self.send({"kind": "scene", "header": header}, buffers=[self._scene.arrays])
+
+        @property
+        def light(self):
+            """The lights, lists (n, 3, K)."""
+            return self.lights
+
+        @light.setter
+        def light(self, light):
+            lights = checked_lights(light, self._scene.header["degree"])
+            known = self._scene.header["lights"]
+            if lights.shape != (len(known), 3, len(known[0][0])):
+                raise ValueError(
+                    f"expected light ({len(known)}, 3, {len(known[0][0])}) as at first, got shape "
+                    f"{lights.shape}"
+                )
+            self.lights = lights.tolist()
+
+    return ViewerWidget

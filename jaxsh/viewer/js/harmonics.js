@@ -1,0 +1,72 @@
+// Turns functions on the sphere, by their coefficients in jaxsh's convention: real, without the
+// Condon–Shortley phase, coefficient l (l + 1) + m.
+
+// Coordinates x, y, z of the three harmonics of degree 1, which are proportional to y, z and x.
+const AXES = [1, 2, 0];
+
+// The blocks of degree 0 to `degree` of the matrix that turns coefficients by a rotation, which is
+// given as three rows: block l is an array of (2l + 1)² numbers, by rows. A recursion in l by
+// Ivanic & Ruedenberg 1996, "Rotation matrices for real spherical harmonics", with their
+// corrections of 1998: equation 8.1 and tables 1 and 2.
+export function rotationBlocks(rotation, degree) {
+  const first = AXES.flatMap((i) => AXES.map((j) => rotation[i][j]));
+  const one = (m, n) => first[3 * (m + 1) + n + 1];
+  const blocks = [[1], first].slice(0, degree + 1);
+  for (let l = 2; l <= degree; l++) {
+    const before = blocks[l - 1];
+    const last = (m, n) => before[(2 * l - 1) * (m + l - 1) + n + l - 1];
+    const product = (i, m, n) => {
+      if (n === l) return one(i, 1) * last(m, l - 1) - one(i, -1) * last(m, 1 - l);
+      if (n === -l) return one(i, 1) * last(m, 1 - l) + one(i, -1) * last(m, l - 1);
+      return one(i, 0) * last(m, n);
+    };
+    const block = [];
+    for (let m = -l; m <= l; m++) {
+      for (let n = -l; n <= l; n++) block.push(element(l, m, n, product));
+    }
+    blocks.push(block);
+  }
+  return blocks;
+}
+
+function element(l, m, n, product) {
+  const size = Math.abs(m);
+  const scale = Math.abs(n) === l ? 2 * l * (2 * l - 1) : (l + n) * (l - n);
+  let sum = 0;
+  if (size < l) sum += Math.sqrt(((l + m) * (l - m)) / scale) * product(0, m, n);
+  const v = Math.sqrt(((l + size - 1) * (l + size)) / scale) / 2;
+  if (m === 0) {
+    sum -= v * Math.SQRT2 * (product(1, 1, n) + product(-1, -1, n));
+  } else if (m === 1) {
+    sum += v * Math.SQRT2 * product(1, 0, n);
+  } else if (m === -1) {
+    sum += v * Math.SQRT2 * product(-1, 0, n);
+  } else if (m > 0) {
+    sum += v * (product(1, m - 1, n) - product(-1, 1 - m, n));
+  } else {
+    sum += v * (product(1, m + 1, n) + product(-1, -m - 1, n));
+  }
+  if (m !== 0 && size < l - 1) {
+    const w = Math.sqrt(((l - size - 1) * (l - size)) / scale) / 2;
+    const both =
+      m > 0
+        ? product(1, m + 1, n) + product(-1, -m - 1, n)
+        : product(1, m - 1, n) - product(-1, 1 - m, n);
+    sum -= w * both;
+  }
+  return sum;
+}
+
+// Coefficients of f(Rᵀω) from those of f, an array of K = (degree + 1)² numbers.
+export function turned(coefficients, blocks) {
+  const result = new Float64Array(coefficients.length);
+  for (let l = 0; l * l < coefficients.length; l++) {
+    const [size, start] = [2 * l + 1, l * l];
+    for (let i = 0; i < size; i++) {
+      let sum = 0;
+      for (let j = 0; j < size; j++) sum += blocks[l][size * i + j] * coefficients[start + j];
+      result[start + i] = sum;
+    }
+  }
+  return result;
+}

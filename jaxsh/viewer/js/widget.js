@@ -1,0 +1,34 @@
+// The viewer as a widget of a notebook (anywidget): the mesh comes as a message once the page asks
+// for it, so that a saved notebook does not hold it.
+import { unpacked } from "./scene.js";
+import { Viewer } from "./viewer.js";
+
+function render({ model, el }) {
+  let viewer;
+  el.classList.add("jaxsh");
+  el.style.height = `${model.get("height")}px`;
+  el.textContent = "Waiting for the mesh …";
+  const lights = () => viewer?.setLights(model.get("lights"));
+  const received = (message, buffers) => {
+    if (message.kind !== "scene" || viewer) return;
+    const view = buffers[0];
+    // A copy, since its start need not be where numbers may stand.
+    const bytes = view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength);
+    try {
+      viewer = new Viewer(el, unpacked(message.header, bytes));
+      lights();
+    } catch (error) {
+      el.textContent = `The picture cannot be shown: ${error.message}`;
+    }
+  };
+  model.on("msg:custom", received);
+  model.on("change:lights", lights);
+  model.send({ kind: "ready" });
+  return () => {
+    model.off("msg:custom", received);
+    model.off("change:lights", lights);
+    viewer?.release();
+  };
+}
+
+export default { render };

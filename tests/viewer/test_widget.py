@@ -1,0 +1,48 @@
+"""The widget's side in Python; its side in the browser is in test_browser.py."""
+
+import sys
+
+import numpy as np
+import pages
+import pytest
+
+from jaxsh import viewer
+
+
+def widget():
+    pytest.importorskip("anywidget", reason="needs the package anywidget")
+    mesh, made, light, _ = pages.example()
+    return viewer.view(made, light, mesh.faces), light
+
+
+def test_the_mesh_is_sent_when_asked_for_and_not_kept_in_the_state(monkeypatch):
+    shown, light = widget()
+    sent = []
+    monkeypatch.setattr(type(shown), "send", lambda self, *said, **more: sent.append((said, more)))
+    shown._answer(shown, {"kind": "ready"}, [])
+    shown._answer(shown, {"kind": "something else"}, [])
+    ((message,), more) = sent[0]
+    assert len(sent) == 1
+    assert message["header"]["numVertices"] == 300
+    assert len(more["buffers"][0]) > 100_000
+    state = {key: shown.get_state(key)[key] for key in shown.keys if not key.startswith("_")}
+    np.testing.assert_array_equal(state["lights"], light[None].astype(np.float64))
+    assert set(state) == {"lights", "height", "layout", "tabbable", "tooltip"}
+
+
+def test_its_light_can_be_changed_and_no_other_shape():
+    shown, light = widget()
+    shown.light = 2 * light
+    np.testing.assert_array_equal(shown.light, 2 * light[None].astype(np.float64))
+    with pytest.raises(ValueError, match=r"expected light \(1, 3, 121\) as at first, got shape"):
+        shown.light = light[:, :4]
+    with pytest.raises(ValueError, match="light must be finite"):
+        shown.light = light * np.inf
+
+
+def test_without_anywidget_it_says_what_to_install(monkeypatch):
+    mesh, made, light, _ = pages.example()
+    monkeypatch.setitem(sys.modules, "anywidget", None)
+    viewer._widget._widget_class.cache_clear()
+    with pytest.raises(ImportError, match=r"pip install 'jaxsh\[viewer\]'"):
+        viewer.view(made, light, mesh.faces)
