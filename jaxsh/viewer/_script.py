@@ -12,7 +12,7 @@ _IMPORT = re.compile(r"^import\s[^;]*?from\s+\"(\./\w+)\.js\";\n", re.MULTILINE)
 @functools.cache
 def text(name: str) -> str:
     """Read a file of the folder `js`."""
-    return files(__package__).joinpath("js", name).read_text("utf-8")
+    return files("jaxsh.viewer").joinpath("js", name).read_text("utf-8")
 
 
 @functools.cache
