@@ -115,7 +115,9 @@ def run(config: InverseDaylight, context: Context) -> Table:
     view, name = _view(config, context)
     shown = []
     for kind in config.skies:
-        truths = _truths(kind, config.settings, context.seed)
+        # Without a sun all pictures are the same.
+        count = 1 if kind == "overcast" else config.settings
+        truths = _truths(kind, count, context.seed)
         for number, truth in enumerate(context.progress(truths, f"{kind} sky")):
             for way in config.ways:
                 clean = _picture(truth, view, config.albedo, shadows=way != "none")
