@@ -49,11 +49,16 @@ def split_sun(
     **Arguments**
 
     - `image`: (H, W, 3), lat-long as for `project_lat_long`, linear radiance.
-    - `count`: how many sources at most, those with the most light.
-    - `threshold`: a number >= 1.
-    - `largest`: the solid angle of a region in steradians; 0.1 is 20° across.
+    - `count`: how many sources at most, those with the most light. One for a sunny panorama; in
+      rooms windows count: shadowed irradiance at degree 10 is off by 9.3, 2.3, 0.9 and 0.7 % with
+      0, 1, 4 and 8 of Galileo's tomb.
+    - `threshold`: a number >= 1. Any from 2 to 8 leaves the same error within 1.5 %.
+    - `largest`: the solid angle of a region in steradians; 0.1 is 20° across. Any from 0.1 to 0.3
+      leaves about the same error.
     - `least`: the share of all light that a source has at least.
     - `rays`: unit vectors in the `shape` of the sources, with equal shares of the light.
+
+    These figures are of real probes: `python -m experiments run sharp --preset paper`.
 
     **Returns** the `Suns`, brightest first, and the picture without them, in its dtype. What is
     taken from the picture is in the suns: integrals over the sphere (weights of `lat_long`) agree
