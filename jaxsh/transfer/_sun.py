@@ -55,7 +55,7 @@ def shade_sun(
         albedo/π Σ_s L_s ∫ V max(0, n·ω) dω + ρ_s Σ_s L_s ∫ V max(0, n·ω) lobe(B·ω) dω
 
     over each source. Unshadowed, integrals over a disc are exact in the first term, also where the
-    horizon cuts it, and to 1e-4 of the lobe's or the disc's own in the second, however narrow
+    horizon cuts it, and to some 1e-4 of the lobe's own or the disc's in the second, however narrow
     the lobe. For a source with a `shape` they are sums over its vectors. Of this the share remains
     that rays see, each weighted by its cosine and by the lobe, though none narrower than rays tell.
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 # Nodes from the inner to the outer rim of the disc about the lobe's axis, and along each arc.
-_RINGS, _ALONG = 12, 4
+_RINGS, _ALONG = 8, 4
 _TINY = 1e-30
 
 
