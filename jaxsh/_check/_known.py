@@ -150,7 +150,7 @@ def conversion(
     reading = best.case.reading
     if reading.said:
         given += ".reshape(-1)"
-    name = next((repr(name) for name, known in conventions().items() if known == convention), None)
+    name = next((f'"{name}"' for name, known in conventions().items() if known == convention), None)
     # Of a basis so many times as large the coefficients are so many times as small.
     divided = "" if scale == 1.0 else f" {'*' if basis else '/'} {scale:.4g}"
     hint = "" if name else ", with found = verdict.found"

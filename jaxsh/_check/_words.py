@@ -44,7 +44,6 @@ _FACTORS = {
     "2/π": 2 / math.pi,
     "π/2": math.pi / 2,
 }
-_FACTORS |= {f"2^{n}" if n > 0 else f"1/2^{-n}": 2.0**n for n in range(-4, 5) if n}
 
 
 def facts(convention: Convention, *, gray: bool = False, basis: bool = False) -> dict[str, str]:
