@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.optimize
@@ -35,7 +36,8 @@ def run(config: LightPrior, context: Context) -> Table:
     }
     for left_out in (None, *(names if len(names) > 1 else ())):
         level, fall = power_law([power for name, power in powers.items() if name != left_out])
-        row = {"left_out": left_out or "none", "level": level, "fall": fall}
+        row: dict[str, Any] = {"left_out": left_out or "none", "level": level, "fall": fall}
+        row |= {"own": None, "ratio": None}
         if left_out is not None:
             law = level * np.arange(1.0, config.degree + 1) ** -fall
             ratio = np.exp(np.mean(np.log(powers[left_out] / law)))
