@@ -49,7 +49,7 @@ def opened(browser, file, faults: list[str]):
     own = ("data:", "blob:", file.as_uri())
     page.on("request", lambda one: one.url.startswith(own) or faults.append(one.url))
     page.goto(file.as_uri())
-    page.wait_for_function("document.getElementById('viewer').viewer?.renderer")
+    page.locator("main canvas").wait_for()  # the page's policy forbids to wait for a function
     page.evaluate("globalThis.viewer = document.getElementById('viewer').viewer")
     return page
 
