@@ -93,7 +93,7 @@ def test_softening_goes_from_none_to_positive_to_the_mean():
     assert harmonics.softening(1.5, 0).tolist() == [1.0]
 
 
-@pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
+@pytest.mark.parametrize("mode", [jax.jacfwd, pytest.param(jax.jacrev, marks=pytest.mark.slow)])
 def test_softening_slope(mode):
     def f(s):
         return harmonics.softening(s, 2)
