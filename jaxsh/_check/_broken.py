@@ -124,7 +124,7 @@ def explain(found: list[Case], decision: Decision, table: Space, *, strength: bo
         notes.append(powers)
     return Verdict(
         decided=False,
-        summary="no convention fits: it is not this light, or has more than one fault",
+        summary="no convention fits: it is another light, too noisy, or has more than one fault",
         residuals=residuals(found, table),
         notes=tuple(notes),
         open=(
