@@ -33,11 +33,11 @@ def export_html(
     """Write a mesh to one HTML file, in which it is seen from all sides and relit.
 
     The file works in every browser with WebGL2, without a network and without a server, also from
-    a mail or an archive. Dragging orbits; dragging with Shift turns the light, exactly, for its
-    coefficients are rotated; sliders set exposure, intensity and the degree at which the light is
-    cut. What is shown is `transfer.shade_diffuse` of the light, carried over the faces as by
-    `imaging.interpolate`, then `imaging.tone_map(…, exposure)`. Transfer is rounded to 16 bits,
-    each harmonic in steps of 1/32767 of its largest coefficient.
+    a mail or an archive. Dragging orbits; dragging with Shift, or the mirror ball that shows the
+    light, turns it, exactly, for its coefficients are rotated; sliders set exposure, intensity and
+    the degree at which the light is cut. What is shown is `transfer.shade_diffuse` of the light,
+    carried over the faces as by `imaging.interpolate`, then `imaging.tone_map(…, exposure)`.
+    Transfer is rounded to 16 bits, each harmonic in steps of 1/32767 of its largest coefficient.
 
     **Arguments**
 

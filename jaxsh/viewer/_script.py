@@ -5,7 +5,7 @@ import re
 from importlib.resources import files
 
 # Each after those that it imports from.
-_MODULES = ("harmonics", "vectors", "scene", "controls", "renderer", "viewer")
+_MODULES = ("harmonics", "vectors", "scene", "controls", "ball", "renderer", "viewer")
 _IMPORT = re.compile(r"^import\s[^;]*?from\s+\"(\./\w+)\.js\";\n", re.MULTILINE)
 
 

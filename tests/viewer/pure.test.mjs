@@ -4,11 +4,11 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { pathToFileURL } from "node:url";
 
-const { folder, turns, cameras, header, bytes, text } = JSON.parse(
+const { folder, turns, basisAt, cameras, header, bytes, text } = JSON.parse(
   readFileSync(process.env.VIEWER_NUMBERS, "utf8"),
 );
 const load = (name) => import(pathToFileURL(`${folder}/${name}.js`));
-const { rotationBlocks, turned } = await load("harmonics");
+const { basis, rotationBlocks, turned } = await load("harmonics");
 const { about, axesOf, clipMatrix, dot, minus, multiply, orbited } = await load("vectors");
 const { decompressed, unpacked } = await load("scene");
 
@@ -22,6 +22,10 @@ test("coefficients turn as by harmonics.rotate", () => {
     const degree = Math.sqrt(coefficients.length) - 1;
     near(turned(coefficients, rotationBlocks(rotation, degree)), expected, 1e-13);
   }
+});
+
+test("the basis is that of harmonics.evaluate", () => {
+  for (const { direction, expected } of basisAt) near([...basis(direction, 10)], expected, 1e-13);
 });
 
 test("a rotation about an axis is Rodrigues' and turns counter-clockwise", () => {

@@ -49,7 +49,7 @@ def opened(browser, file, faults: list[str]):
     own = ("data:", "blob:", file.as_uri())
     page.on("request", lambda one: one.url.startswith(own) or faults.append(one.url))
     page.goto(file.as_uri())
-    page.locator("main canvas").wait_for()  # the page's policy forbids to wait for a function
+    page.locator("main canvas").first.wait_for()  # the page's policy forbids to wait for a function
     page.evaluate("globalThis.viewer = document.getElementById('viewer').viewer")
     return page
 
@@ -96,7 +96,7 @@ def test_colors_are_pythons(page):
 
 def test_shift_and_drag_turn_the_light(page):
     _, made, light, albedo = pages.example()
-    box = page.locator("canvas").bounding_box()
+    box = page.locator("canvas").first.bounding_box()
     x, y = box["x"] + 100, box["y"] + 100
     across = 60 * np.pi / min(box["width"], box["height"])  # about +z, which is up
     page.keyboard.down("Shift")
@@ -140,7 +140,7 @@ def test_the_picture_is_imagings(browser, tmp_path):
 
 def test_a_drag_orbits_and_sliders_are_moved_by_keys(page):
     before = colors(page)
-    box = page.locator("canvas").bounding_box()
+    box = page.locator("canvas").first.bounding_box()
     page.mouse.move(box["x"] + 100, box["y"] + 100)
     page.mouse.down()
     page.mouse.move(box["x"] + 150, box["y"] + 120, steps=2)
@@ -154,6 +154,29 @@ def test_a_drag_orbits_and_sliders_are_moved_by_keys(page):
     assert page.evaluate("viewer.state.exposure") == pytest.approx(2**0.1)
     page.get_by_role("combobox").select_option("Light 2")
     assert page.evaluate("viewer.state.index") == 1
+
+
+def test_the_ball_mirrors_the_light_and_turns_it(page):
+    _, _, light, _ = pages.example()
+    page.evaluate("new Promise(requestAnimationFrame)")
+    ball = "viewer.ball.context.getImageData(0, 0, 80, 80).data"
+    picture = read(page, ball, np.uint8).reshape(80, 80, 4)
+    facts = page.evaluate("viewer.scene.camera")
+    camera = imaging.Camera(*(np.array(facts[key]) for key in ("position", "target", "up")))
+    axes = np.array(camera._axes()) * [[1], [1], [-1]]  # to the right, upwards, towards the eye
+    at = (np.array([[40, 40], [20, 60], [70, 30]]) + 0.5) / 40 - 1  # row and column
+    x, y = at[:, 1], -at[:, 0]
+    z = np.sqrt(1 - x**2 - y**2)
+    mirrored = np.stack([2 * z * x, 2 * z * y, 2 * z * z - 1], axis=-1) @ axes
+    radiance = np.asarray(harmonics.evaluate(mirrored, pages.DEGREE)) @ light.T
+    found = picture[[40, 20, 70], [40, 60, 30], :3]
+    assert abs(found - levels(radiance, 1.5)).max() <= 0.6
+    page.locator(".jaxsh-ball").drag_to(
+        page.locator(".jaxsh-ball"),
+        source_position={"x": 20, "y": 40},
+        target_position={"x": 60, "y": 40},
+    )
+    assert page.evaluate("viewer.state.rotation[0][1]") < -0.05
 
 
 def test_a_lost_context_comes_back(page):
@@ -177,7 +200,7 @@ def test_all_of_the_panel_can_be_reached(page, size):
         page.get_by_label(label).scroll_into_view_if_needed()
         assert page.get_by_label(label).bounding_box()["width"] > 100
     assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-    box = page.locator("canvas").bounding_box()
+    box = page.locator("canvas").first.bounding_box()
     assert box["height"] > 0.5 * size[1]
 
 
@@ -218,7 +241,7 @@ def test_the_widget_draws_and_follows_its_light(browser, file):
     assert abs(levels(colors(page)) - levels(shaded)).max() < 0.1
     page.evaluate("(lights) => model.set('lights', lights)", (0.5 * light[None]).tolist())
     assert abs(levels(colors(page)) - levels(0.5 * shaded)).max() < 0.1
-    assert page.locator("canvas").bounding_box()["height"] == 300
+    assert page.locator("canvas").first.bounding_box()["height"] == 300
     page.evaluate("clean()")
     assert page.evaluate("Object.keys(listeners)") == []
     page.context.close()

@@ -27,6 +27,14 @@ def turns(rng) -> list[dict]:
     return made
 
 
+def basis_at(rng) -> list[dict]:
+    directions = rng.normal(size=(6, 3))
+    directions[0] = 0, 0, -1
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    values = np.asarray(harmonics.evaluate(directions, 10))
+    return [{"direction": d, "expected": v} for d, v in zip(directions, values, strict=True)]
+
+
 def cameras(rng) -> list[dict]:
     """Points on rays through pixel centers, and where those are from -1 to 1, upwards."""
     made = []
@@ -50,6 +58,7 @@ def test_pure_javascript_agrees_with_python(rng, tmp_path):
     numbers = {
         "folder": str(files("jaxsh.viewer").joinpath("js")),
         "turns": turns(rng),
+        "basisAt": basis_at(rng),
         "cameras": cameras(rng),
         "header": header | {"first": np.asarray(mesh.vertices[0])},
         "bytes": len(arrays),
@@ -64,4 +73,4 @@ def test_pure_javascript_agrees_with_python(rng, tmp_path):
         text=True,
     )
     assert run.returncode == 0, run.stdout + run.stderr
-    assert "pass 6" in run.stdout
+    assert "pass 7" in run.stdout

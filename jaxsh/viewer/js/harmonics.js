@@ -70,3 +70,25 @@ export function turned(coefficients, blocks) {
   }
   return result;
 }
+
+// The K = (degree + 1)² harmonics in a direction of unit length. Those of order m are a polynomial in
+// z, by the three-term recursion of normalized Legendre functions, times the real or the imaginary
+// part of (x + iy)^|m|.
+export function basis([x, y, z], degree) {
+  const values = new Float64Array((degree + 1) ** 2);
+  let [cosine, sine, first] = [1, 0, Math.sqrt(1 / (4 * Math.PI))];
+  for (let m = 0; m <= degree; m++) {
+    let [before, last] = [0, first];
+    for (let l = m; l <= degree; l++) {
+      const middle = l * (l + 1);
+      values[middle + m] = last * cosine;
+      if (m > 0) values[middle - m] = last * sine;
+      const size = (n) => Math.sqrt((4 * n * n - 1) / (n * n - m * m));
+      const next = size(l + 1) * (z * last - (l > m ? before / size(l) : 0));
+      [before, last] = [last, next];
+    }
+    first *= Math.sqrt(((m === 0 ? 2 : 1) * (2 * m + 3)) / (2 * m + 2));
+    [cosine, sine] = [x * cosine - y * sine, x * sine + y * cosine];
+  }
+  return values;
+}

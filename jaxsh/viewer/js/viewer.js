@@ -1,11 +1,13 @@
 // A mesh under a light that can be turned, dimmed and cut: state, pointer, keyboard, panel.
+import { Ball } from "./ball.js";
 import { button, menu, panel, slider, toggle } from "./controls.js";
 import { rotationBlocks, turned } from "./harmonics.js";
 import { Renderer } from "./renderer.js";
 import { about, axesOf, minus, multiply, orbited, plus } from "./vectors.js";
 
 const UNTURNED = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-const HINT = "Drag to orbit, Shift-drag to turn the light, wheel or pinch to come near. "
+const HINT = "Drag to orbit; drag the mirror ball, or with Shift, to turn the light; wheel or pinch to "
+  + "come near. "
   + "With the keyboard: arrows, Shift and arrows, + and −.";
 const STEP = Math.PI / 36;
 
@@ -21,7 +23,8 @@ export class Viewer {
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", `${scene.title}. ${HINT}`);
     root.classList.add("jaxsh");
-    root.replaceChildren(this.canvas, this.#panel());
+    this.ball = new Ball(scene.degree);
+    root.replaceChildren(this.canvas, this.ball.canvas, this.#panel());
     root.viewer = this;
     this.#listen();
     this.#build();
@@ -97,11 +100,14 @@ export class Viewer {
     requestAnimationFrame(() => {
       this.waiting = false;
       if (!this.renderer || this.released) return;
-      if (this.shades) this.renderer.shade(this.light());
+      const light = this.light();
+      if (this.shades) this.renderer.shade(light);
       this.shades = false;
       const { width, height } = this.canvas;
-      const { camera, exposure } = this.state;
-      this.renderer.draw(camera, exposure * this.scene.exposure, width, height);
+      const { camera } = this.state;
+      const exposure = this.state.exposure * this.scene.exposure;
+      this.renderer.draw(camera, exposure, width, height);
+      this.ball.draw(light, camera, exposure);
     });
   }
 
@@ -173,28 +179,8 @@ export class Viewer {
 
   #listen() {
     const { canvas } = this;
-    const held = new Map();
-    const spread = () => {
-      const [a, b] = [...held.values()];
-      return Math.hypot(a[0] - b[0], a[1] - b[1]);
-    };
-    canvas.addEventListener("pointerdown", (event) => {
-      held.set(event.pointerId, [event.clientX, event.clientY]);
-      canvas.setPointerCapture(event.pointerId);
-    });
-    canvas.addEventListener("pointermove", (event) => {
-      const last = held.get(event.pointerId);
-      if (!last) return;
-      const before = held.size === 2 ? spread() : 0;
-      held.set(event.pointerId, [event.clientX, event.clientY]);
-      if (held.size === 2) return void this.#zoom(before / Math.max(spread(), 1));
-      const scale = Math.PI / Math.min(canvas.clientWidth, canvas.clientHeight);
-      const [dx, dy] = [event.clientX - last[0], event.clientY - last[1]];
-      this.#turn(dx * scale, dy * scale, event.shiftKey || this.turns);
-    });
-    for (const name of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(name, (event) => held.delete(event.pointerId));
-    }
+    this.#listenToDrags(canvas, (event) => event.shiftKey || this.turns);
+    this.#listenToDrags(this.ball.canvas, () => true);
     const near = (event) => {
       event.preventDefault();
       this.#zoom(Math.exp(Math.max(-0.3, Math.min(0.3, event.deltaY / 500))));
@@ -210,6 +196,33 @@ export class Viewer {
       this.#draw(false);
     });
     this.observer.observe(canvas);
+  }
+
+  // A drag turns the light where `light` says so of an event, and otherwise orbits.
+  #listenToDrags(element, light) {
+    const held = new Map();
+    const spread = () => {
+      const [a, b] = [...held.values()];
+      return Math.hypot(a[0] - b[0], a[1] - b[1]);
+    };
+    element.addEventListener("pointerdown", (event) => {
+      held.set(event.pointerId, [event.clientX, event.clientY]);
+      element.setPointerCapture(event.pointerId);
+    });
+    element.addEventListener("pointermove", (event) => {
+      const last = held.get(event.pointerId);
+      if (!last) return;
+      const before = held.size === 2 ? spread() : 0;
+      held.set(event.pointerId, [event.clientX, event.clientY]);
+      if (held.size === 2) return void this.#zoom(before / Math.max(spread(), 1));
+      const { clientWidth, clientHeight } = this.canvas;
+      const scale = Math.PI / Math.min(clientWidth, clientHeight);
+      const [dx, dy] = [event.clientX - last[0], event.clientY - last[1]];
+      this.#turn(dx * scale, dy * scale, light(event));
+    });
+    for (const name of ["pointerup", "pointercancel"]) {
+      element.addEventListener(name, (event) => held.delete(event.pointerId));
+    }
   }
 
   #key(event) {
