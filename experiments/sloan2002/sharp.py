@@ -181,6 +181,8 @@ def _errors(
     suns = _suns_light(config, subject, subject.chosen["shadowed"], light.suns, exponents)
     few = min(16, config.rays)
     sixteen = _suns_light(config, subject, subject.chosen["shadowed"], light.suns, (0.0,), rays=few)
+    plain = light.suns and dataclasses.replace(light.suns, shape=None)
+    discs = _suns_light(config, subject, subject.chosen["shadowed"], plain, (0.0,))
     front = facing(subject)
     for variant in VARIANTS:
         truth = {e: found[probe, 0, variant, e] for e in exponents}
@@ -209,9 +211,9 @@ def _errors(
                 exact = found[probe, count, variant, BY_COEFFICIENTS].value
                 scale = 100 / np.linalg.norm(truth[0.0].value)
                 row["bake"] = scale * float(np.linalg.norm(rest - exact))
-                row["error_few_rays"] = relative_error(
-                    rest + sixteen[variant, 0.0], truth[0.0].value
-                )
+                for name, other in (("few_rays", sixteen), ("discs", discs)):
+                    got = rest + other[variant, 0.0]
+                    row[f"error_{name}"] = relative_error(got, truth[0.0].value)
             yield row
 
 
