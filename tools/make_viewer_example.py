@@ -1,0 +1,62 @@
+"""Make the page and the picture of `docs/viewer.md`: a knot under three lights.
+
+python tools/make_viewer_example.py docs
+
+The picture needs the package playwright and a Chromium that is installed; `CHROMIUM=path` names
+one.
+"""
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxsh import geometry, harmonics, imaging, sky, sphere, transfer, viewer
+
+DEGREE = 6
+
+
+def make_page(path: Path) -> Path:
+    mesh = geometry.knot(4000)
+    baked = transfer.bake(mesh, degree=DEGREE, directions=1024, bounces=1, progress=False)
+    studio = sphere.project_lat_long(imaging.studio(), DEGREE)
+    afternoon = np.array([0.6, -0.6, 0.53]) / np.linalg.norm([0.6, -0.6, 0.53])
+    clear = sky.preetham_harmonics(afternoon, 3.0, DEGREE)
+    lights = {
+        "studio, softened against ringing": studio * harmonics.window("hann", DEGREE),
+        "studio as it is": studio,
+        "clear sky, without the sun's disc": clear * (studio[0, 0] / clear[0, 0]),
+    }
+    return viewer.export_html(
+        path,
+        baked,
+        jnp.stack(list(lights.values())),
+        mesh.faces,
+        albedo=np.array([0.8, 0.62, 0.48]),
+        names=list(lights),
+        title="A knot to relight",
+    )
+
+
+def make_picture(page: Path, path: Path) -> None:
+    from playwright.sync_api import sync_playwright
+
+    chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    options = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    with sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=chromium, args=[*options, "--no-sandbox"])
+        shown = browser.new_page(viewport={"width": 960, "height": 540})
+        shown.goto(page.resolve().as_uri())
+        shown.locator("main canvas").first.wait_for()
+        shown.wait_for_timeout(500)
+        shown.screenshot(path=path)
+        browser.close()
+
+
+if __name__ == "__main__":
+    docs = Path(sys.argv[1])
+    make_page(docs / "examples" / "viewer.html")
+    make_picture(docs / "examples" / "viewer.html", docs / "images" / "viewer.png")
