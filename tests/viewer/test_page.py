@@ -1,6 +1,7 @@
 """The page as a file: self-contained, and its arrays those of Python. No browser is needed."""
 
 import re
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
@@ -148,3 +149,9 @@ def test_what_does_not_fit_is_refused(tmp_path, unchecked):
         with pytest.raises(ValueError, match=message):
             viewer.export_html(path, **given)
     assert not path.exists()
+
+
+def test_the_documentations_example_is_of_this_viewer():
+    # Otherwise: python tools/make_viewer_example.py docs
+    example = Path(__file__).parents[2] / "docs" / "examples" / "viewer.html"
+    assert pages.parts(example)[2].strip() == _script.script("page").strip()
