@@ -39,7 +39,7 @@ def draw(
     figure, axes = plt.subplots(
         len(pictures),
         7,
-        figsize=(15, 2.2 * len(pictures)),
+        figsize=(15, 1.75 * len(pictures) + 0.2),
         width_ratios=[1, 1, 1, 1, 1.7, 1.7, 1.7],
         layout="constrained",
         squeeze=False,

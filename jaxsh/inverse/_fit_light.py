@@ -17,8 +17,8 @@ from ._light_result import RecoveredLight
 from ._pixels import as_rows
 from ._solve import everywhere
 
-# Bands of the light that a picture with normals is fitted with, under a prior: what lies above
-# shifts irradiance by less than 0.3 % (`python -m experiments run inverse.light`).
+# Bands of the light that a picture with normals is fitted with, under a prior. What lies above is
+# 0.2 % of the radiance: the noise that `inverse.light` finds where there is none.
 _BANDS = 12
 
 
@@ -97,6 +97,21 @@ def fit_light(
     not finite, all zero, or weighted by less than 0.
 
     Vertices, or rows of a picture, may be shared out over a mesh of devices.
+
+    **Error** of a light of degree 2, in % of its length, at 1 % of noise: means over five probes,
+    each left out of its prior, seen on 1000 vertices of a head (`python -m experiments run
+    inverse.light --preset paper --turns 2`).
+
+    | | one view | two | four |
+    |---|---|---|---|
+    | normals, least squares | 18.6 | 4.2 | 3.0 |
+    | normals, prior | 5.7 | 0.3 | 0.3 |
+    | with shadows, least squares | 18.0 | 6.0 | 4.6 |
+    | with shadows, prior | 7.6 | 0.7 | 0.7 |
+
+    The worst from one view are 45 and 10 % by normals, 32 and 14 % with shadows. Where noise is
+    next to nothing, what no band holds is all that is left: it errs all in one way, and by up to
+    2.5 deviations. The prior takes channels for independent: what is unseen may be tinted.
 
     **Example**
 
