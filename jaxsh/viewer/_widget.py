@@ -1,9 +1,11 @@
 """A mesh to relight in a notebook."""
 
+import base64
 import functools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from jaxtyping import ArrayLike, Float, Int
 
 from .._core.checks import check_size
@@ -11,6 +13,7 @@ from ..imaging import Camera
 from ..transfer import Transfer
 from ._scene import Scene, checked_lights, make_scene
 from ._script import script, text
+from ._still import Still
 
 if TYPE_CHECKING:
     from anywidget import AnyWidget
@@ -31,9 +34,9 @@ def view(
     """Show a mesh in a notebook, to be seen from all sides and relit there and from Python.
 
     What is shown, and how it is handled, is as in the page that `export_html` writes. The mesh is
-    sent once, when the widget is first drawn, and is not saved with the notebook. Assigning to the
-    widget's `light` relights it: 3 K numbers are sent. Needs the package anywidget (`pip install
-    'jaxsh[viewer]'`).
+    sent once, when the widget is first drawn, and is not saved with the notebook; a picture of the
+    first light is, for where no script runs. Assigning to the widget's `light` relights it: 3 K
+    numbers are sent. Needs the package anywidget (`pip install 'jaxsh[viewer]'`).
 
     **Arguments** are those of `export_html`, but for the path; and `height` in pixels.
 
@@ -55,7 +58,7 @@ def view(
     """
     height = check_size("height", height, 100)
     scene = make_scene(transfer, light, faces, albedo, camera, exposure, names, title)
-    return _widget_class()(scene, height)
+    return _widget_class()(scene, height, Still(transfer, faces, albedo, height))
 
 
 @functools.cache
@@ -77,15 +80,25 @@ def _widget_class() -> Any:
         lights = traitlets.List().tag(sync=True)
         height = traitlets.Int().tag(sync=True)
 
-        def __init__(self, scene: Scene, height: int):
+        def __init__(self, scene: Scene, height: int, still: Still):
             super().__init__(lights=scene.header["lights"], height=height)
-            self._scene = scene
+            self._scene, self._still = scene, still
             self.on_msg(self._answer)
 
         def _answer(self, widget, message, buffers):
             if message == {"kind": "ready"}:
                 header = self._scene.header
                 self.send({"kind": "scene", "header": header}, buffers=[self._scene.arrays])
+
+        def _repr_mimebundle_(self, **options):
+            bundle = super()._repr_mimebundle_(**options)
+            if bundle is None:
+                return None
+            data, metadata = bundle
+            picture = self._still.png(np.asarray(self.lights[0]), self._scene.header)
+            shown = {"text/plain": f"viewer of {self._scene.header['numVertices']} vertices"}
+            shown["image/png"] = base64.b64encode(picture).decode("ascii")
+            return data | shown, metadata
 
         @property
         def light(self):

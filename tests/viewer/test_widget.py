@@ -1,12 +1,16 @@
 """The widget's side in Python; its side in the browser is in test_browser.py."""
 
+import base64
+import io
 import sys
 
 import numpy as np
 import pages
 import pytest
+from PIL import Image
+from scipy.ndimage import binary_erosion
 
-from jaxsh import viewer
+from jaxsh import imaging, transfer, viewer
 
 
 def widget():
@@ -38,6 +42,29 @@ def test_its_light_can_be_changed_and_no_other_shape():
         shown.light = light[:, :4]
     with pytest.raises(ValueError, match="light must be finite"):
         shown.light = light * np.inf
+
+
+@pytest.mark.slow
+def test_a_picture_stands_where_no_script_runs():
+    pytest.importorskip("anywidget", reason="needs the package anywidget")
+    mesh, _, light, _ = pages.example(300, 2)
+    made = transfer.unshadowed(mesh.vertices, mesh.normals, 2)
+    camera = imaging.Camera.facing(mesh, width=30, height=20)
+    albedo = np.full((300, 1), 0.5, np.float32)
+    shown = viewer.view(made, light, mesh.faces, albedo, camera=camera, exposure=1.5, height=100)
+    data, _ = shown._repr_mimebundle_()
+    assert data["text/plain"] == "viewer of 300 vertices"
+    with Image.open(io.BytesIO(base64.b64decode(data["image/png"]))) as image:
+        picture = np.asarray(image)
+    assert picture.shape == (100, 150, 4)
+    larger = imaging.Camera.facing(mesh, width=150, height=100)
+    raster = imaging.rasterize(mesh, larger)
+    shaded = transfer.shade_diffuse(light, made, albedo)
+    expected = imaging.tone_map(imaging.interpolate(raster, shaded), 1.5)
+    inside = binary_erosion(np.asarray(raster.mask), np.ones((3, 3)))
+    assert (picture[inside, 3] == 255).all()
+    apart = abs(picture[inside, :3] - 255 * np.asarray(expected)[inside]).max(axis=-1)
+    assert np.median(apart) < 1  # four samples, and one
 
 
 def test_without_anywidget_it_says_what_to_install(monkeypatch):

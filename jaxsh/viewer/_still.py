@@ -1,0 +1,46 @@
+"""A picture of what a page first shows, for where no script runs."""
+
+import io
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ..geometry import Mesh
+from ..imaging import Camera, interpolate, rasterize, tone_map
+from ..transfer import Transfer, shade_diffuse
+
+
+class Still:
+    """Draws a mesh under a light, from where and at the exposure that a page's header says."""
+
+    def __init__(self, transfer: Transfer, faces: ArrayLike, albedo: ArrayLike, height: int):
+        self.transfer, self.albedo, self.height = transfer, albedo, height
+        faces = jnp.asarray(np.asarray(faces, np.int32))
+        self.mesh = Mesh(transfer.positions, faces, transfer.normals)
+
+    def png(self, light: Float[np.ndarray, "3 k"], header: dict[str, Any]) -> bytes:
+        """A PNG with the ground transparent, four samples in a pixel."""
+        facts, dtype = header["camera"], self.transfer.dtype
+        position, target, up = (
+            np.asarray(facts[name], self.transfer.positions.dtype)
+            for name in ("position", "target", "up")
+        )
+        width = max(1, round(self.height * facts["aspect"]))
+        camera = Camera(position, target, up, facts["fovY"], width, self.height)
+        raster = rasterize(self.mesh, camera, samples=2)
+        shaded = shade_diffuse(jnp.asarray(light, dtype), self.transfer, self.albedo)
+        return _encoded(interpolate(raster, shaded), raster.alpha, header["exposure"])
+
+
+def _encoded(radiance: Float[Array, "h w 3"], alpha: Float[Array, "h w"], exposure: float) -> bytes:
+    from PIL import Image
+
+    cover = alpha[..., None].astype(radiance.dtype)
+    # Its color is that of the object alone.
+    colors = tone_map(radiance / jnp.where(cover > 0, cover, 1), exposure)
+    pixels = np.concatenate([np.asarray(colors), np.asarray(cover)], axis=-1)
+    file = io.BytesIO()
+    Image.fromarray(np.rint(255 * pixels).astype(np.uint8)).save(file, "PNG")
+    return file.getvalue()
