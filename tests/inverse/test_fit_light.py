@@ -242,7 +242,7 @@ def test_deviations_are_true_of_light_like_the_prior(rng):
 def test_errors(rng, unchecked):
     normals = cap(rng)
     observed = np.ones((COUNT, 3))
-    made = transfer.unshadowed(normals, normals, 1)
+    made = transfer.Transfer(np.ones((COUNT, 4)), normals, normals, np.zeros((COUNT, 1), int))
     for arguments, options, sentence in [
         ((observed, made, 0.5, 2), {}, "degree 2 needs a transfer of that degree, got degree 1"),
         ((observed, normals, 0.5, 2), {"prior": "probe"}, "did you mean 'probes'"),

@@ -132,11 +132,11 @@ def test_window_that_is_needed(rng):
 
 
 def test_errors(rng, unchecked):
-    normals, observed = cap(rng, 8), np.ones((8, 3))
-    labels = np.arange(8)
+    normals, observed = cap(rng, 48), np.ones((48, 3))  # a shape that is compiled already
+    labels = np.arange(48)
     for options, sentence in [
-        ({"materials": labels[:-1]}, r"expected materials \(8,\), got shape \(7,\)"),
-        ({"materials": labels - 1}, "numbered 0, 1, …, got -1 to 6"),
+        ({"materials": labels[:-1]}, r"expected materials \(48,\), got shape \(47,\)"),
+        ({"materials": labels - 1}, "numbered 0, 1, …, got -1 to 46"),
         ({"materials": labels, "loss": "huber"}, "loss as 'squares' with materials"),
         ({"nonnegative": "lights"}, "did you mean 'light'"),
         ({"window": "irradience"}, "did you mean 'irradiance'"),
