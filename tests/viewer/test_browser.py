@@ -227,7 +227,7 @@ HARNESS = """async ([code, header, text]) => {
   globalThis.clean = widget.render({ model: globalThis.model, el });
   globalThis.listeners = listeners;
   await new Promise((done) => setTimeout(done, 200));
-  globalThis.viewer = el.viewer;
+  globalThis.viewer = el.firstChild.viewer;
 }"""
 
 

@@ -5,9 +5,10 @@ import { Viewer } from "./viewer.js";
 
 function render({ model, el }) {
   let viewer;
-  el.classList.add("jaxsh");
-  el.style.height = `${model.get("height")}px`;
-  el.textContent = "Waiting for the mesh …";
+  // An element of our own, since the notebook sets the height of its.
+  const root = el.appendChild(document.createElement("div"));
+  root.style.height = `${model.get("height")}px`;
+  root.textContent = "Waiting for the mesh …";
   const lights = () => viewer?.setLights(model.get("lights"));
   const received = (message, buffers) => {
     if (message.kind !== "scene" || viewer) return;
@@ -15,10 +16,10 @@ function render({ model, el }) {
     // A copy, since its start need not be where numbers may stand.
     const bytes = view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength);
     try {
-      viewer = new Viewer(el, unpacked(message.header, bytes));
+      viewer = new Viewer(root, unpacked(message.header, bytes));
       lights();
     } catch (error) {
-      el.textContent = `The picture cannot be shown: ${error.message}`;
+      root.textContent = `The picture cannot be shown: ${error.message}`;
     }
   };
   model.on("msg:custom", received);
