@@ -6,6 +6,8 @@ directions whose rays get past the mesh, and that of the sun's disc over rays to
 """
 
 import dataclasses
+import functools
+from collections.abc import Callable
 from typing import Any, Literal, NamedTuple, get_args
 
 import jax.numpy as jnp
@@ -38,6 +40,8 @@ class InverseDaylight:
     """what shines: the model that is fitted, another one, or no sun and the CIE's overcast sky"""
     ways: tuple[Way, ...] = get_args(Way)
     """shadows: none in the picture; in it, but not in the fit; through a transfer; traced too"""
+    model: Literal["preetham", "hosek"] = "preetham"
+    """the sky that is fitted: Preetham's, or Hosek and Wilkie's through a fit of `sky.fit`"""
     settings: int = 6
     """suns and turbidities, drawn at random"""
     noise: float = 0.01
@@ -123,11 +127,14 @@ def run(config: InverseDaylight, context: Context) -> Table:
                 clean = _picture(truth, view, config.albedo, shadows=way != "none")
                 noise = np.random.default_rng([context.seed, number]).normal(size=clean.shape)
                 observed = clean + config.noise * clean.mean() * noise
-                found = _find(way, observed, view, config.albedo)
-                context.record(_row(number, way, truth, found))
+                found = _find(way, observed, view, config)
+                context.record(_row(number, way, truth, found, config))
                 if number == 0 and way == config.ways[-1]:
-                    again = _render(found.value, view, config.albedo)
-                    shown.append(Shown(truth, observed, again, found.value))
+                    again = _render(found.value, view, config)
+                    seen = Truth(
+                        config.model, np.asarray(found.value.sun), float(found.value.turbidity)
+                    )
+                    shown.append(Shown(truth, observed, again, found.value, seen))
     caption = "observed, as rendered from the light that was found, and that light beside the true"
     draw(context.path("recovered.png", caption), view.raster, shown)
     about = {"name": name, "pixels": len(view.free)}
@@ -194,17 +201,28 @@ def _sunlit(view: View, sun: Float[Array, " 3"]) -> Float[Array, " p"]:
     return transfer.sun_visibility(suns, view.baked, view.scene).fraction[:, 0].astype(sun.dtype)
 
 
+@functools.cache
+def _model(name: str) -> Callable[..., Array]:
+    if name == "preetham":
+        return functools.partial(sky.preetham_harmonics, degree=_DEGREE)
+    radiance = functools.partial(sky.hosek_radiance, albedo=float(_GROUND.mean()), check="allow")
+    fitted = sky.fit(
+        radiance, {"turbidity": (2.5, 6.0)}, degree=_DEGREE, terms=(12, 8), log=["turbidity"]
+    )
+    return lambda sun, turbidity: fitted(sun, turbidity)
+
+
 def _find(
-    way: Way, observed: Float[np.ndarray, "p 3"], view: View, albedo: float
+    way: Way, observed: Float[np.ndarray, "p 3"], view: View, config: InverseDaylight
 ) -> inverse.Recovered[inverse.Daylight]:
+    albedo = config.albedo
+    fit = functools.partial(inverse.fit_daylight, sky=_model(config.model), throw=False)
     if way == "transfer":
-        return inverse.fit_daylight(observed, view.baked, albedo, throw=False)
-    found = inverse.fit_daylight(observed, view.normals, albedo, throw=False)
+        return fit(observed, view.baked, albedo)
+    found = fit(observed, view.normals, albedo)
     for doubt in _DOUBTS if way == "traced" else ():
         sunlit, sure = _shadows(view, np.asarray(found.value.sun), np.radians(doubt))
-        found = inverse.fit_daylight(
-            observed, view.baked, albedo, sunlit=sunlit, mask=sure, throw=False
-        )
+        found = fit(observed, view.baked, albedo, sunlit=sunlit, mask=sure)
     return found
 
 
@@ -227,20 +245,28 @@ def _shadows(
     return sunlit, sure | (np.abs(view.normals @ sun) < np.sin(doubt))
 
 
-def _render(value: inverse.Daylight, view: View, albedo: float) -> Float[np.ndarray, "p 3"]:
+def _render(
+    value: inverse.Daylight, view: View, config: InverseDaylight
+) -> Float[np.ndarray, "p 3"]:
     """The picture that a light found makes, shadows included."""
-    rest = transfer.shade_diffuse(value.harmonics(_DEGREE, sun=False), view.baked, albedo)
-    return np.asarray(rest + transfer.shade_sun(value.suns, view.baked, view.scene, albedo))
+    rest = value.harmonics(_DEGREE, sun=False, sky=_model(config.model))
+    rest = transfer.shade_diffuse(rest, view.baked, config.albedo)
+    return np.asarray(rest + transfer.shade_sun(value.suns, view.baked, view.scene, config.albedo))
 
 
 def _row(
-    number: int, way: Way, truth: Truth, found: inverse.Recovered[inverse.Daylight]
+    number: int,
+    way: Way,
+    truth: Truth,
+    found: inverse.Recovered[inverse.Daylight],
+    config: InverseDaylight,
 ) -> dict[str, Any]:
     value, deviation = found.value, found.confidence.deviation
     sunny = truth.kind != "overcast"
     distance = np.linalg.norm(np.asarray(value.sun) - truth.sun)
     facing, level = np.asarray(value.facing).sum(), truth.level().sum()
-    above = value.exposure * sky.preetham_harmonics(value.sun, value.turbidity, 1)
+    above = value.exposure * _model(config.model)(value.sun, value.turbidity)
+    total = float(jnp.sum(sky.horizontal_irradiance(above) + value.sun[2] * value.facing))
     return {
         "sky": truth.kind,
         "way": way,
@@ -255,7 +281,7 @@ def _row(
         "ground_deviation": float(np.sqrt(np.mean(deviation.ground**2))),
         "sun_light": facing / truth.facing.sum() - 1 if sunny else float("nan"),
         "sky_light": float(jnp.sum(sky.horizontal_irradiance(above))) / level - 1,
-        "sun_share": facing * float(value.sun[2]) / (facing * float(value.sun[2]) + level),
+        "sun_share": 1 - float(jnp.sum(sky.horizontal_irradiance(above))) / total,
         "residual": float(found.statistics.residual),
         "converged": found.converged,
         "at_bound": bool(found.statistics.at_bound),

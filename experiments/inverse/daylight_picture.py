@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jaxsh import imaging, inverse, sky, sphere
+from jaxsh import imaging, inverse, sphere
 
 from ..shared.plots import plt, save
 
@@ -24,6 +24,7 @@ class Shown(NamedTuple):
     observed: Float[np.ndarray, "p 3"]
     again: Float[np.ndarray, "p 3"]
     value: inverse.Daylight
+    model: "Truth"  # whose sky is that of the value
 
 
 def draw(path: Path, raster: imaging.Raster, shown: list[Shown]) -> None:
@@ -50,7 +51,7 @@ def draw(path: Path, raster: imaging.Raster, shown: list[Shown]) -> None:
             shades = np.array(imaging.tone_map(jnp.asarray(picture), exposure))
             shades[~mask] = 1
             axis.imshow(shades)
-        lights = truth.radiance(directions), _radiance(value, directions)
+        lights = truth.radiance(directions), _radiance(case, directions)
         exposure = 0.5 / lights[0].mean()
         suns = (truth.sun if truth.facing.any() else None), np.asarray(value.sun)
         for axis, light, sun in zip(row[2:], lights, suns, strict=True):
@@ -72,12 +73,9 @@ def draw(path: Path, raster: imaging.Raster, shown: list[Shown]) -> None:
     save(figure, path, dpi=100)
 
 
-def _radiance(
-    value: inverse.Daylight, directions: Float[np.ndarray, "n 3"]
-) -> Float[np.ndarray, "n 3"]:
+def _radiance(case: Shown, directions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
     """Sky and ground that were found, without the sun's disc."""
-    above = value.exposure * sky.preetham_radiance(directions, value.sun, value.turbidity)
-    harmonics = value.exposure * sky.preetham_harmonics(value.sun, value.turbidity, 1)
-    level = sky.horizontal_irradiance(harmonics) + value.sun[2] * value.facing
-    ground = value.ground / np.pi * level
-    return np.where(directions[:, 2:] < 0, np.asarray(ground), np.asarray(above))
+    exposure, value = float(case.value.exposure), case.value
+    level = exposure * case.model.level() + np.asarray(value.sun[2] * value.facing)
+    ground = np.asarray(value.ground) / np.pi * level
+    return np.where(directions[:, 2:] < 0, ground, exposure * case.model.above(directions))

@@ -85,7 +85,8 @@ def fit_daylight(
     which normals that look up hardly tell. What nothing tells has an infinite deviation. An error
     of the model is not in the deviations: another sky than Preetham's, a white balance that is off,
     or shadows that are not accounted for shift the turbidity most
-    (`python -m experiments run inverse.daylight`).
+    (`python -m experiments run inverse.daylight`). Very low suns are redder than sRGB holds, by up
+    to some percent of red; here no channel is below 0.
 
     Raises `ValueError` for shapes that do not fit, and, where values are known, for data that are
     not finite, all zero, or weighted by less than 0.
@@ -237,7 +238,7 @@ def _recover(rows, sunlit, *, sky, bounds, exposure, starts, tolerance, max_step
 def _unit(shading: Shading) -> Float[Array, ""]:
     """Irradiance that, the same from all sides, makes about as much light as was observed."""
     white = jnp.zeros((3, 1), shading.target.dtype).at[:].set(2 * math.sqrt(math.pi))
-    shaded = jnp.linalg.norm(shading.residual(white) + shading.target)
+    shaded = jnp.linalg.norm(shading.shaded(white))
     return math.pi / jnp.where(shaded > 0, shaded, 1)
 
 
@@ -254,7 +255,7 @@ def _starts(shading, sky, bounds, exposure, unit, count) -> Float[Array, "s p"]:
     target = shading.target
 
     def shaded(light):
-        return shading.residual(with_ground(light, ground)) + target
+        return shading.shaded(with_ground(light, ground))
 
     def look(sun, haze):
         above = sky(sun, to_interval(haze, *bounds))[:, :size]

@@ -209,8 +209,8 @@ def _residual(shading: Shading, sky: Sky, light: SkyLight) -> Float[Array, " r"]
 
 def _brightness(shading: Shading, sky: Sky, light: SkyLight) -> Float[Array, ""]:
     """Finds the exposure that fits this sky best, or 1 where that is not positive."""
-    target = shading.target.ravel()
-    shaded = _residual(shading, sky, light) + target
+    target = shading.target
+    shaded = shading.shaded(light.exposure * sky(light.sun, light.turbidity))
     along, own = jnp.sum(shaded * target), jnp.sum(shaded * shaded)
     return jnp.where((along > 0) & (own > 0), along / jnp.where(own > 0, own, 1), 1)
 

@@ -27,10 +27,13 @@ class Shading(eqx.Module):
 
     def residual(self, light: Float[Array, "3 k"]) -> Float[Array, "3 r"]:
         """Residual of a light of the operator's degree or below."""
+        return self.shaded(light) - self.target
+
+    def shaded(self, light: Float[Array, "3 k"]) -> Float[Array, "3 r"]:
+        """What a light makes; taken from the residual, it would be lost beside the target."""
         operator = self.operator[..., : light.shape[-1]]
         operator = jnp.broadcast_to(operator, (3, *operator.shape[1:]))
-        shaded = einsum("crk,ck->cr", operator, light)
-        return shaded / self.scale - self.target
+        return einsum("crk,ck->cr", operator, light) / self.scale
 
 
 def compress(
