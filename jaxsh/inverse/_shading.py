@@ -30,7 +30,7 @@ class Shading(eqx.Module):
         return self.shaded(light) - self.target
 
     def shaded(self, light: Float[Array, "3 k"]) -> Float[Array, "3 r"]:
-        """What a light makes; taken from the residual, it would be lost beside the target."""
+        """Shade by a light; from the residual, it would be lost beside the target."""
         operator = self.operator[..., : light.shape[-1]]
         operator = jnp.broadcast_to(operator, (3, *operator.shape[1:]))
         return einsum("crk,ck->cr", operator, light) / self.scale
