@@ -1,6 +1,6 @@
 """Random lights in random conventions with noise: how often a check is right, open, or wrong.
 
-python tests/check/sweep.py 400
+PYTHONPATH=. python tests/check/sweep.py 20
 """
 
 import collections
