@@ -66,6 +66,7 @@ def scene(tmp_path_factory):
 
 
 class TestScene:
+    @pytest.mark.slow
     def test_the_brightest_percent_that_faces_the_eye_is_above_white(self, scene):
         largest = np.asarray(scene.full()).max(axis=1)[np.asarray(scene.facing)]
         assert np.percentile(largest, 99) == pytest.approx(1, abs=1e-4)

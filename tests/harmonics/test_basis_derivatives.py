@@ -66,7 +66,7 @@ def test_gradient_four_ways(degree):
     np.testing.assert_allclose(gradient, scipy_gradient(POINTS, degree), 0, 3e-10 * size)
 
 
-@pytest.mark.parametrize("degree", [3, 30])
+@pytest.mark.parametrize("degree", [3, pytest.param(30, marks=pytest.mark.slow)])
 def test_gradient_has_no_radial_part(degree, rng):
     s = rng.normal(size=(40, 3)) * 10.0 ** rng.uniform(-3, 3, (40, 1))
     _, gradient = harmonics.evaluate_with_gradient(s, degree)

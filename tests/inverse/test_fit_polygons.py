@@ -93,6 +93,7 @@ def test_recovers_two_lights_from_the_better_guess(baked, rng):
         assert (deviation.center < 0.2).all()
 
 
+@pytest.mark.slow
 def test_float32_under_x64_with_the_pose_kept(baked):
     """Traced, not compiled: what failed here was a dtype (`test_solve` has the numbers)."""
     single = jax.tree.map(lambda x: x.astype(jnp.float32) if x.dtype == float else x, baked)

@@ -43,7 +43,7 @@ def test_one_sample_shades_like_its_extrapolation(rng, count, dtype):
     [
         pytest.param(1, "none", marks=pytest.mark.slow),
         pytest.param(1, "full", marks=pytest.mark.slow),
-        (2, "half"),
+        pytest.param(2, "half", marks=pytest.mark.slow),
     ],
 )
 def test_samples_shade_like_their_blend(rng, order, rule):

@@ -57,6 +57,7 @@ def test_farthest_covers_within_twice_the_best(rng):
     np.testing.assert_array_equal(place_samples(x, 2, method="farthest"), points[:2])
 
 
+@pytest.mark.slow
 def test_predicted_error_is_that_of_the_blend(rng):
     checks, points = rng.uniform(-0.5, 0.5, (20, 3)), rng.uniform(-0.5, 0.5, (3, 3))
     found = Prediction.of(_light, points, checks, 4.0).error([0, 1, 2])[0]

@@ -50,9 +50,8 @@ def test_how_good_the_papers_polynomial_is():
     assert 0.2 < 100 * error.mean.max() < 0.3
 
 
-@pytest.mark.parametrize(
-    ("size", "error"), [("small", 1e-12), pytest.param("full", 1e-6, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("size", "error"), [("small", 1e-12), ("full", 1e-6)])
 def test_monomials_are_the_same_polynomial(size, error, request, rng):
     """In float64, to what the sum of monomials leaves: 1e-13 at degree (5, 3), 1e-6 at (13, 7)."""
     fit = request.getfixturevalue(size)
