@@ -5,10 +5,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ..harmonics import degrees
+from ..harmonics import conventions, convert, degrees
 from ._decide import Case, cases, decide
 from ._given import MOST, Light, Reading
 from ._known import judge
@@ -36,6 +37,8 @@ def check_basis(function: Callable) -> Verdict:
     """The verdict on a basis."""
     seen = _look(function)
     matrix, degree = seen.matrix, math.isqrt(len(seen.matrix)) - 1
+    if degree == 0:
+        return _constant(seen)
     table = space(degree, degree, basis=True)
     found = [_as_case(matrix, table)]
     decision = decide(found, table)
@@ -44,6 +47,27 @@ def check_basis(function: Callable) -> Verdict:
         verdict = judge(found, decision, table, strength=True, basis=True)
         return replace(verdict, notes=(*seen.notes, *tests, *verdict.notes))
     return _faulty(seen, found[0], table, tests)
+
+
+def _constant(seen: Seen) -> Verdict:
+    """The verdict on one function, which shows its constant and nothing else."""
+    if seen.beyond[0] >= 0.02:
+        return Verdict(decided=False, summary="one function, and no constant", notes=seen.notes)
+    size = float(seen.matrix[0, 0])
+    alike = []
+    for name, known in conventions().items():
+        if isinstance(known.order, str):
+            plain = replace(known, layout="coefficients-last", quantity="radiance")
+            scale = float(convert(np.ones(1), plain, "jaxsh")[0])
+            if abs(size / scale - 1) <= _TOLERANCE:
+                alike.append(name)
+    return Verdict(
+        decided=False,
+        summary=f"one function, the constant {factor(size / math.sqrt(4 * math.pi))}",
+        agree=tuple(alike),
+        open=("axes, signs and orders show from degree 1 on",),
+        notes=seen.notes,
+    )
 
 
 def _as_case(matrix: np.ndarray, table: Space) -> Case:
@@ -75,7 +99,7 @@ def _look(function: Callable) -> Seen:
     matrix = (basis * weights[:, None]).T @ values(directions, degree)
     whole = weights @ basis**2
     inside = np.sum(matrix**2, axis=1)
-    beyond = np.sqrt(np.maximum(1 - inside / np.maximum(whole, np.finfo(float).tiny), 0))
+    beyond = np.sqrt(np.maximum(1 - inside / np.where(whole > 0, whole, 1), 0)) * (whole > 0)
     matrix[np.abs(matrix) < 1e-9 * np.abs(matrix).max()] = 0.0
     return Seen(matrix, np.where(beyond < 1e-6, 0.0, beyond), tuple(notes))
 
@@ -84,16 +108,24 @@ def _called(function: Callable, directions: np.ndarray, notes: list[str]) -> np.
     """Values (N, K), whatever way the function takes directions and gives values."""
     count = len(directions)
     try:
-        result = np.asarray(function(directions), np.float64)
+        result = _real(function(directions.copy()))
         good = result.ndim == 2 and count in result.shape
     except (TypeError, ValueError, IndexError):
         good, result = False, directions
     if not good:
-        result = np.stack([np.asarray(function(one), np.float64).ravel() for one in directions])
+        result = np.stack([_real(function(one.copy())).ravel() for one in directions])
     elif result.shape[0] != count:
         notes.append("its values come as (K, N); (N, K) is expected")
         result = result.T
     return result
+
+
+def _real(result) -> np.ndarray:
+    """Values in float64; raises `ValueError` for complex ones and what is no array of numbers."""
+    array = np.asarray(result)
+    if array.dtype.kind not in "fiub" and not jnp.issubdtype(array.dtype, jnp.floating):
+        raise ValueError(f"expected real values of the basis, got dtype {array.dtype}")
+    return array.astype(np.float64)
 
 
 def _tests(seen: Seen) -> tuple[list[str], bool]:
@@ -119,7 +151,9 @@ def _tests(seen: Seen) -> tuple[list[str], bool]:
         degree = math.isqrt(len(matrix)) - 1
         out = np.flatnonzero(seen.beyond >= 0.02)
         why = "its functions depend on each other"
-        if len(out):
+        if sizes.min() == 0:
+            why = f"function {int(sizes.argmin())} is zero"
+        elif len(out):
             number = int(out[seen.beyond[out].argmax()])
             why = (
                 f"function {number} is no polynomial of degree {degree}: "

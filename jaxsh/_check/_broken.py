@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from ..harmonics import degrees
 from ._decide import Case, Choice, Decision, near_one
-from ._known import convention_of, conversion, judge, residuals, same_layout
+from ._known import around, convention_of, conversion, judge, residuals, same_layout
 from ._matching import Match, constants, described, match
 from ._search import numbers
 from ._space import Space, space
@@ -58,7 +58,7 @@ def windowed(
         words.pop("quantity", None)
     scale = 1.0 if not strength or near_one(choice.scale, seen.error) else choice.scale
     call = conversion(choice, convention, scale, table)
-    call = f'{call} / harmonics.window("{kind}", {table.degree})' if kind else ""
+    call = around(call, f'{{}} / harmonics.window("{kind}", {table.degree})') if kind else ""
     verdict = Verdict(
         decided=bool(kind),
         summary=", ".join(words.values()),
@@ -115,7 +115,7 @@ def explain(found: list[Case], decision: Decision, table: Space, *, strength: bo
                 f"turned by {angle:.1f}° about z, from x towards y, beside what was given",
                 *verdict.faults,
             ),
-            conversion=f"harmonics.rotate_z({verdict.conversion}, {-turn.angle:.4f})",
+            conversion=around(verdict.conversion, f"harmonics.rotate_z({{}}, {-turn.angle:.4f})"),
         )
     if best.error <= _NEAR:
         return _by_chance(best, decision, found, table)

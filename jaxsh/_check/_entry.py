@@ -96,6 +96,10 @@ def _as_picture(picture) -> np.ndarray:
     array = as_host_float(picture, "picture")
     array = array[..., None] if array.ndim == 2 else array
     check_shape("picture", array.shape, lat_long=True)
+    if min(array.shape[:2]) < 3:
+        raise ValueError(
+            f"expected picture of 3 rows or more, which show directions, got shape {array.shape}"
+        )
     check_finite("picture", array, wait=True)
     if not array.any():
         raise ValueError("picture must not be black throughout: there is nothing to check")
@@ -127,6 +131,7 @@ def _from_picture(readings: list[Reading], picture: np.ndarray) -> Verdict:
         lambda degree, channels: mistaken(picture, min(degree, most), channels),
         strength=True,
         most=most,
+        channels=picture.shape[2],
     )
     largest = float(np.mean(picture == picture.max()))
     if verdict.decided or largest < _CLIPPED or np.ptp(picture) == 0:
@@ -135,7 +140,9 @@ def _from_picture(readings: list[Reading], picture: np.ndarray) -> Verdict:
     return replace(verdict, notes=(*verdict.notes, note))
 
 
-def _verdict(readings, lights, mistakes, *, strength: bool, most: int = MOST) -> Verdict:
+def _verdict(
+    readings, lights, mistakes, *, strength: bool, most: int = MOST, channels: int = 1
+) -> Verdict:
     groups: dict[int, list[Reading]] = {}
     for reading in readings:
         groups.setdefault(math.isqrt(reading.channels.shape[1]) - 1, []).append(reading)
@@ -165,8 +172,9 @@ def _verdict(readings, lights, mistakes, *, strength: bool, most: int = MOST) ->
             verdict = replace(verdict, decided=False, open=(*verdict.open, doubt))
         verdicts.append((decision, verdict))
     if not verdicts:
+        counts = sorted({len(reading.channels) for reading in readings})
         raise ValueError(
-            "expected coefficients with the channels of picture, or with one, got "
-            f"{sorted({len(reading.channels) for reading in readings})}"
+            "expected given with the channels of picture, or with one, got "
+            f"{' or '.join(map(str, counts))} beside {channels} of picture"
         )
     return min(verdicts, key=lambda pair: pair[0].best.error)[1]

@@ -1,6 +1,7 @@
 """Coefficients of a light that is known, from a picture or a direction: the verdict."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -157,6 +158,12 @@ def conversion(
     if convention.quantity != "radiance" and space.degree > 2:
         hint += ", after truncating to degree 2: irradiance has no light of degree 3, 5, …"
     return f'harmonics.convert({given}, {name or "found"}, "jaxsh"){divided}{hint}'
+
+
+def around(call: str, form: str) -> str:
+    """Put a call into a form like "f({})"; the hint behind the call stays behind."""
+    code, *hint = re.split("(, (?:with found|after truncating).*)", call, maxsplit=1)
+    return form.format(code) + "".join(hint)
 
 
 def _say_case(case: Case, faults: list[str], notes: list[str]) -> None:

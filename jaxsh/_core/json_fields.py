@@ -57,8 +57,12 @@ def numbers(
         or (length is not None and len(value) != length)
         or not all(isinstance(x, int | float) and not isinstance(x, bool) for x in value)
     ):
-        count = "numbers" if length is None else f"{length} numbers"
-        raise ValueError(f"{owner} should have {count} as {key!r}, got {shown(value)}")
+        count = "numbers" if length is None else f"{length} number{'s' * (length != 1)}"
+        got = shown(value)
+        if isinstance(value, list):
+            others = (x for x in value if not isinstance(x, int | float) or isinstance(x, bool))
+            got += next((f" with {shown(x)} in it" for x in others), "")
+        raise ValueError(f"{owner} should have {count} as {key!r}, got {got}")
     try:
         value = [float(x) for x in value]
     except OverflowError:

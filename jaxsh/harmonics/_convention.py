@@ -85,7 +85,7 @@ class Convention:
                 f"expected basis_axes as x, y and z in some order, got {described(self.basis_axes)}"
             )
         if self.degree is not None:
-            check_degree(self.degree)
+            _set(self, "degree", check_degree(self.degree))
         limits = [self.degree] if self.degree is not None else []
         if self.normalization == "polynomial":
             limits.append(2)
@@ -195,4 +195,4 @@ def _checked_pairs(order) -> tuple[tuple[int, int], ...]:
             "expected order as 'ascending', 'descending' or each (l, m) up to a degree once, got "
             f"{described(order)}"
         )
-    return pairs
+    return tuple((int(l), int(m)) for l, m in pairs)

@@ -59,8 +59,7 @@ def convert(
                 f"got degree {degree}"
             )
     _check_channels(array.shape, source.layout, target.layout)
-    matrices = _matrices(source, target, degree)
-    _check_range(matrices, array.dtype)
+    _check_range(source, target, degree, array.dtype)
     return _convert(array, source, target, degree)
 
 
@@ -86,13 +85,12 @@ def _matrices(source: Convention, target: Convention, degree: int) -> list[np.nd
 
     In float64, so that all is rounded once.
     """
-    incoming = scales(source, degree) * _quantity_factors(source, target, degree)
-    outgoing = 1 / scales(target, degree)
-    turn = axes_matrix(target) @ axes_matrix(source).T
-    if (turn == np.eye(3)).all():
+    incoming, outgoing = _factors(source, target, degree)
+    turn = _turn(source, target)
+    if turn is None:
         return [incoming * outgoing]
     bands = [slice(l * l, (l + 1) ** 2) for l in range(degree + 1)]
-    blocks = axes_blocks(tuple(map(tuple, turn.tolist())), degree)
+    blocks = axes_blocks(turn, degree)
     if degree > _DENSE:
         both = zip(bands, blocks, strict=True)
         return [outgoing[band, None] * block * incoming[band] for band, block in both]
@@ -100,6 +98,22 @@ def _matrices(source: Convention, target: Convention, degree: int) -> list[np.nd
     for band, block in zip(bands, blocks, strict=True):
         whole[band, band] = block
     return [outgoing[:, None] * whole * incoming]
+
+
+@read_only_cache(maxsize=32)
+def _factors(
+    source: Convention, target: Convention, degree: int
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    """Factors before and after the axes are turned."""
+    incoming = scales(source, degree) * _quantity_factors(source, target, degree)
+    return incoming, 1 / scales(target, degree)
+
+
+@functools.lru_cache(maxsize=32)
+def _turn(source: Convention, target: Convention) -> tuple[tuple[int, ...], ...] | None:
+    """Find the turn between axes; None where they stay."""
+    turn = axes_matrix(target) @ axes_matrix(source).T
+    return None if (turn == np.eye(3)).all() else tuple(map(tuple, turn.tolist()))
 
 
 def _quantity_factors(
@@ -121,16 +135,24 @@ def _quantity_factors(
     return factors / lambdas if seen[0] else factors * lambdas
 
 
-def _check_range(matrices: list[np.ndarray], dtype) -> None:
-    """Raises `ValueError` where factors are too large or too small for a dtype."""
+def _check_range(source: Convention, target: Convention, degree: int, dtype) -> None:
+    """Raises `ValueError` where factors are too large or too small for a dtype.
+
+    Elements of a turn may vanish: beside them in their row are others, of which none is lost.
+    """
     most, least = float(jnp.finfo(dtype).max), float(jnp.finfo(dtype).tiny)
-    for matrix in matrices:
-        size = np.abs(matrix[matrix != 0])
-        if not ((size >= least) & (size <= most)).all():
-            raise ValueError(
-                f"the factors of these conventions do not fit into the dtype {dtype} of "
-                "coefficients: expected a lower degree, or float64"
-            )
+    incoming, outgoing = _factors(source, target, degree)
+    with np.errstate(invalid="ignore"):  # infinite times zero
+        if _turn(source, target) is None:
+            size = np.abs(incoming * outgoing)
+        else:
+            ends = [np.array([np.abs(f).min(), np.abs(f).max()]) for f in (incoming, outgoing)]
+            size = np.multiply.outer(*ends)
+    if not ((size >= least) & (size <= most)).all():
+        raise ValueError(
+            f"the factors of these conventions do not fit into the dtype {dtype} of "
+            "coefficients: expected a lower degree, or float64"
+        )
 
 
 _SHAPES = {

@@ -1,6 +1,7 @@
 """Lights as coefficients: from files of other packages, and to them."""
 
 import dataclasses
+import math
 import os
 import warnings
 from pathlib import Path
@@ -94,7 +95,8 @@ def read_light(
     (3, 1)
     """
     path = as_path(path)
-    _check_options(convention, up, which)
+    _check_options(convention, up)
+    which = _as_place(which)
     _check_suffix(path, "read")
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such light")
@@ -107,9 +109,7 @@ def read_light(
         raise ValueError(f"{path}: {reason(error, 350)}") from error
 
 
-def _check_options(
-    convention: str | Convention | None, up: str | None, which: str | int | None = None
-) -> None:
+def _check_options(convention: str | Convention | None, up: str | None) -> None:
     known = conventions()
     named = isinstance(convention, str) and convention in known
     if convention is not None and not named and not isinstance(convention, Convention):
@@ -119,8 +119,11 @@ def _check_options(
         )
     if up is not None:
         check_choice("up", up, ("z", "y"))
-    if which is not None and not isinstance(which, str):
-        check_size("which", which, 0)
+
+
+def _as_place(which: str | int | None) -> str | int | None:
+    """The name or the place of a light, a place as a Python int."""
+    return which if which is None or isinstance(which, str) else check_size("which", which, 0)
 
 
 def _check_suffix(path: Path, what: str) -> None:
@@ -151,8 +154,15 @@ def _in_ours(
     facts = _facts(convention, up, stored.layout)
     values = _floats(stored.values)
     if values.ndim == 1 and facts.layout == "channels-last":
-        values = values.reshape(-1, 3) if values.size % 3 == 0 else values
+        # No square is three times another: it is one channel or three of them.
+        one = math.isqrt(values.size) ** 2 == values.size
+        values = values.reshape(-1, 1 if one or values.size % 3 else 3)
     light = np.asarray(convert(values, facts, _OWN))
+    if stored.single and light.ndim > 2:
+        raise ValueError(
+            f"expected one light, got numbers of shape {values.shape}, which are {len(values)} in "
+            f"the layout {facts.layout!r}"
+        )
     if light.ndim == 1 or light.shape[-2] == 1:
         rows = light if light.ndim > 1 else light[None]
         light = np.broadcast_to(rows, (*rows.shape[:-2], 3, rows.shape[-1]))

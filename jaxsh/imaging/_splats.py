@@ -148,8 +148,9 @@ def write_splats(
 ) -> Path:
     """Write splats as a binary PLY that 3D Gaussian splatting reads, and return its path.
 
-    With the properties in the order of its own `save_ply`, normals of zero among them. With `up`
-    as it was read, "z" by default, `read_splats` gives the same splats back to the last bit.
+    With the properties in the order of its own `save_ply`, normals of zero among them.
+    `read_splats` with the same `up` gives the same splats back: to the last bit for "z", to
+    rounding of rotations and coefficients for the others.
 
     **Arguments**
 

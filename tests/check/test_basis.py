@@ -112,6 +112,18 @@ def test_no_space_of_harmonics():
     assert any("not a rotation-invariant space: function 8" in note for note in verdict.notes)
     verdict = jaxsh.check(lambda d: samples.basis(d)[..., [0, 1, 2, 3, 4, 5, 6, 7, 4]])
     assert any("depend on each other" in note for note in verdict.notes)
+    verdict = jaxsh.check(lambda d: samples.basis(d) * (np.arange(9) != 8))
+    assert any(note.endswith("space: function 8 is zero") for note in verdict.notes)
+
+
+def test_one_function_shows_a_constant():
+    verdict = jaxsh.check(lambda d: np.full((len(d), 1), 0.2821))
+    assert not verdict.decided
+    assert verdict.summary == "one function, the constant 0.2821 (1/√(4π))"
+    assert {"jaxsh", "unreal"} <= set(verdict.agree)
+    assert "pyshtools-4pi" not in verdict.agree
+    assert "pyshtools-4pi" in jaxsh.check(lambda d: np.ones((len(d), 1))).agree
+    assert jaxsh.check(lambda d: d[:, :1]).summary == "one function, and no constant"
 
 
 def test_axes_askew(rng):
@@ -130,6 +142,7 @@ def test_functions_of_several_forms():
         (one_direction, ""),
         (lambda d: samples.basis(d).T, "its values come as (K, N); (N, K) is expected"),
         (lambda d: jnp.asarray(samples.basis(d), jnp.float32), ""),
+        (lambda d: (samples.basis(d), d.fill(0.0))[0], ""),  # writes into what it was given
     ):
         verdict = jaxsh.check(function)
         assert verdict.decided
@@ -150,5 +163,9 @@ def test_a_pole_without_a_value():
 def test_errors():
     with pytest.raises(ValueError, match="got 7 for a direction"):
         jaxsh.check(lambda d: np.ones((len(d), 7)))
+    with pytest.raises(ValueError, match="expected real values of the basis, got dtype complex"):
+        jaxsh.check(lambda d: samples.basis(d) + 0j)
+    with pytest.raises(ValueError, match="expected real values of the basis, got dtype object"):
+        jaxsh.check(lambda d: None)
     with pytest.raises(ValueError, match="expected finite values"):
         jaxsh.check(lambda d: np.full((len(d), 9), np.nan))

@@ -249,6 +249,14 @@ def test_turned_by_no_quarter(image, light):
     scope = {"harmonics": harmonics, "coefficients": given}
     back = eval(verdict.conversion, scope)
     np.testing.assert_allclose(back, light, rtol=0, atol=0.01 * np.abs(light).max())
+    # Where no name is known, the hint stands behind the whole call.
+    mirrored = harmonics.Convention(axes=("-z", "+y", "+x"))
+    given = harmonics.convert(harmonics.rotate_z(light, 0.3), "jaxsh", mirrored)
+    verdict = jaxsh.check(given, image)
+    call, hint = verdict.conversion.split(", with ")
+    assert hint == "found = verdict.found"
+    back = eval(call, scope | {"coefficients": given, "found": verdict.found})
+    np.testing.assert_allclose(back, light, rtol=0, atol=0.01 * np.abs(light).max())
 
 
 def test_a_furnace_tests_constants_only():
@@ -316,7 +324,8 @@ def test_what_is_traced_is_refused(image):
         (lambda: jaxsh.check(np.zeros(9)), "zero throughout"),
         (lambda: jaxsh.check(np.ones(9), np.zeros((8, 16, 3))), "black throughout"),
         (lambda: jaxsh.check(np.ones(9), direction=np.zeros(3)), "nonzero x, y, z"),
-        (lambda: jaxsh.check(np.ones((2, 9)), np.ones((8, 16, 3))), "channels of picture"),
+        (lambda: jaxsh.check(np.ones((2, 9)), np.ones((8, 16, 3))), "got 2 beside 3 of picture"),
+        (lambda: jaxsh.check(np.ones(9), np.ones((2, 4, 3))), "3 rows or more, .* got .*2, 4, 3"),
         (lambda: jaxsh.check(np.ones(9), np.ones((16, 16, 3))), "twice as wide as high"),
     ],
 )

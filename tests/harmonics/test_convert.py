@@ -178,6 +178,18 @@ def test_factors_that_a_dtype_does_not_hold():
     assert np.isfinite(harmonics.convert(ones, "pyshtools-unnorm", "jaxsh")).all()
     with pytest.raises(ValueError, match="do not fit into the dtype"):
         harmonics.convert(np.ones((2, 32, 32), np.float32), "pyshtools-unnorm", "jaxsh")
+    # The other way what is divided by infinity would be zero without a word.
+    with pytest.raises(ValueError, match="do not fit into the dtype"):
+        harmonics.convert(np.ones(156**2), "jaxsh", "pyshtools-unnorm")
+
+
+def test_elements_of_a_turn_may_vanish(rng):
+    """Axes turned by matrices whose smallest elements no half or single holds."""
+    light = rng.normal(size=400).astype(np.float16)
+    found = harmonics.convert(light, "jaxsh", "e3nn-integral")
+    assert found.dtype == jnp.float16
+    exact = harmonics.convert(light.astype(float), "jaxsh", "e3nn-integral")
+    np.testing.assert_allclose(found.astype(float), exact, rtol=0, atol=8e-3)
 
 
 @pytest.mark.parametrize(
@@ -207,10 +219,12 @@ def test_a_convention_says_what_is_not_ours():
         assert eval(repr(convention), {"Convention": Convention}) == convention
 
 
-def test_facts_can_be_changed():
+def test_facts_can_be_changed(unchecked):
     conventions = harmonics.conventions()
     changed = dataclasses.replace(conventions["filament"], layout="by-coefficient", degree=5)
     assert changed.degree == 2  # the polynomials end there
     assert len({*conventions.values(), changed}) > 15  # can be a static argument of `jit`
+    numbers = Convention(order=[(np.int64(0), np.int32(0))], degree=np.int64(3))
+    assert repr(numbers) == "Convention(order=((0, 0),), degree=0)"
     with pytest.raises(TypeError):
         conventions["mine"] = changed  # pyright: ignore[reportIndexIssue]

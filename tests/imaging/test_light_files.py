@@ -60,6 +60,19 @@ def test_one_of_several_probes_is_named(tmp_path):
         read_light(path, which=2)
 
 
+def test_a_list_is_one_light(tmp_path, unchecked):
+    rows = written(tmp_path / "a.json", [[1.0, 2.0, 3.0]] * 9)
+    with pytest.raises(ValueError, match=r"one light, got numbers of shape \(9, 3\), which are 9"):
+        read_light(rows, convention="unity")
+    with pytest.raises(ValueError, match="a list of numbers is one light: which must be None"):
+        read_light(rows, convention="three.js", which=1)
+    bare = written(tmp_path / "b.json", THREE["object"] | {"sh": [None] * 27})
+    with pytest.raises(ValueError, match="27 numbers as 'sh', got a list of 27 with none in it"):
+        read_light(bare)
+    scene = written(tmp_path / "c.json", THREE)
+    assert np.array_equal(read_light(scene, which=np.int64(0)), read_light(scene))  # pyright: ignore
+
+
 def test_cmgen_prints_three_quantities(tmp_path):
     """Each line's comment says which; the shader and the polynomials of its source agree."""
     values = files.rows()
@@ -141,6 +154,9 @@ def test_arrays_of_other_people(tmp_path, rng):
     assert np.array_equal(
         read_light(written(tmp_path / "b.json", THREE["object"]["sh"]), convention="three.js"), flat
     )
+    red = written(tmp_path / "c.json", THREE["object"]["sh"][::3])  # 9 numbers, of one channel
+    gray = read_light(red, convention="three.js")
+    np.testing.assert_allclose(gray, np.repeat(flat[:1], 3, axis=0), rtol=0, atol=1e-15)
 
 
 def test_what_is_written_is_read_back(tmp_path, rng):

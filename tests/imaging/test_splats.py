@@ -86,6 +86,8 @@ def test_other_kinds_of_numbers_and_of_splats(tmp_path):
     assert back.scales.shape == (4, 2)
     assert back.opacities is None
     assert back.rotations is None
+    none = Splats(*(one[:0] for one in (single.positions, single.coefficients)))
+    assert read_splats(write_splats(path, none)).coefficients.shape == (0, 3, 4)
     order = np.random.default_rng(0).permutation(len(files.names(1)))
     shuffled = values[:, order], [files.names(1)[i] for i in order]
     path.write_bytes(files.ply(*shuffled))

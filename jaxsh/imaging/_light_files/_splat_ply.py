@@ -136,7 +136,7 @@ def put_splats(file: BinaryIO, arrays: SplatArrays) -> None:
         (["nx", "ny", "nz"], np.broadcast_to(np.float32(0), (count, 3))),
         ([f"f_dc_{c}" for c in range(3)], coefficients[..., 0]),
     ]
-    rest = coefficients[..., 1:].reshape(count, -1)
+    rest = coefficients[..., 1:].reshape(count, 3 * (coefficients.shape[2] - 1))
     groups.append(([f"f_rest_{i}" for i in range(rest.shape[1])], rest))
     if arrays.opacities is not None:
         groups.append((["opacity"], arrays.opacities[:, None]))

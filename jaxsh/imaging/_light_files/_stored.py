@@ -18,6 +18,7 @@ class Stored(NamedTuple):
     convention: str | Convention | None  # None where the file does not say
     layout: str | None = None  # the file's, whatever the convention
     rotation: Float[np.ndarray, "3 3"] | None = None  # of the light, in the file's axes
+    single: bool = False  # the file holds one light, whatever its numbers' shape
 
 
 def choose(what: str, names: Sequence[str], which: str | int | None, default: int | None) -> int:

@@ -20,6 +20,8 @@ def read_three(path: Path, which: str | int | None) -> Stored:
     """
     tree = parse(path.read_bytes())
     if isinstance(tree, list):
+        if which is not None:
+            raise ValueError(f"a list of numbers is one light: which must be None, got {which!r}")
         return _bare(tree)
     if not isinstance(tree, dict):
         raise ValueError(f"its JSON should be an object, got {shown(tree)}")
@@ -52,7 +54,7 @@ def _bare(rows: list) -> Stored:
         values = [numbers({"rows": row}, "rows", "the file", len(rows[0]), None) for row in rows]
     else:
         values = numbers({"list": rows}, "list", "the file", None, None)
-    return Stored(np.array(values), None)
+    return Stored(np.array(values), None, single=True)
 
 
 def three_file(values: Float[np.ndarray, "9 3"]) -> bytes:
