@@ -13,7 +13,7 @@ from ._alone import check_alone
 from ._basis import check_basis
 from ._broken import explain, windowed
 from ._decide import cases, decide
-from ._given import MOST, Reading, mistaken, of_direction, of_picture, read
+from ._given import MOST, Reading, mistaken, of_direction, of_picture, read, tinted
 from ._known import furnace, judge
 from ._search import FLOOR
 from ._space import space
@@ -36,7 +36,8 @@ def check(
     normalization, axes in every right- or left-handed placement, layout and quantity, up to a
     scale. What agrees is named, with the call of `harmonics.convert` that follows; where several
     agree, so is what would decide. Where none does, single coefficients that break the nearest one
-    are named, and mistakes of the picture: gamma-encoded, clipped, pixels weighted equally.
+    are named, and mistakes of the picture: gamma-encoded, clipped, white-balanced, pixels weighted
+    equally.
 
     **Arguments**
 
@@ -162,6 +163,9 @@ def _verdict(
         if mistakes and decision.best.error > FLOOR:
             others = {count: mistakes(degree, count) for count in counts}
             more = cases(some, others, table)
+            for reading in some:
+                count = len(reading.channels)
+                more += cases([reading], {count: tinted(reading, known[count])}, table)
             decision = decide([*found, *more], table, free_scale=not strength)
             found = [*found, *more]
         verdict, doubt = windowed(found, decision, table, strength=strength)

@@ -12,6 +12,8 @@ from ..harmonics import degrees, orders
 from ..sphere import lat_long, project_lat_long
 from ._placements import values
 
+# Channels are told apart from those of the picture from this ratio of their factors on.
+_TINT = 1.03
 # Larger degrees add hardly anything to a verdict.
 MOST = 8
 
@@ -48,7 +50,7 @@ def read(given) -> list[Reading]:
     if not readings:
         raise ValueError(
             "expected given as coefficients of one light, (C, K), (K, C), (K,), (3·K,) or "
-            f"(C, 2, L+1, L+1) with K = (L+1)² = 1, 4, 9, 16, …, got shape {array.shape}"
+            f"(C, 2, L+1, L+1) with C <= 4 and K = (L+1)² = 1, 4, 9, 16, …, got shape {array.shape}"
         )
     if not array.any():
         raise ValueError("given must not be zero throughout: there is nothing to check")
@@ -135,6 +137,23 @@ def mistaken(picture: Float[np.ndarray, "h w c"], degree: int, channels: int) ->
         for light in _in_channels(_project(other, degree), channels):
             found.append(light._replace(said="; ".join(filter(None, (said, light.said))), cost=6.0))
     return found
+
+
+def tinted(reading: Reading, lights: list[Light]) -> list[Light]:
+    """The light with channels multiplied so that its constants are those given, where they differ.
+
+    All facts change the constants of all channels alike, so that these show the factors exactly.
+    """
+    plain = next((light.coefficients for light in lights if not light.said), None)
+    if plain is None or len(plain) < 2 or plain[:, 0].min() <= 0:
+        return []
+    gains = reading.channels[:, 0] / plain[:, 0]
+    if gains.min() <= 0 or gains.max() < _TINT * gains.min():
+        return []
+    gains = gains / np.median(gains)
+    words = ", ".join(f"{gain:.3g}" for gain in gains)
+    said = f"its channels are those of the picture times {words}: a white balance, say"
+    return [Light(plain * gains[:, None], said, 8.0)]
 
 
 def _project(picture, degree: int) -> Float[np.ndarray, "c k"]:

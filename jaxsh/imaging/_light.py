@@ -272,7 +272,8 @@ def _content(
     convention: str | Convention,
     facts: Convention,
 ) -> Content:
-    name = convention if isinstance(convention, str) else None
+    named = isinstance(convention, str) and conventions()[convention].axes == facts.axes
+    name = convention if named else None  # with other axes it is not what has that name
     match suffix:
         case ".json":
             return three_file(values)

@@ -163,6 +163,18 @@ def test_gray(image, light):
     assert "gray: green alone" in verdict.notes
 
 
+def test_a_white_balance(image, light):
+    """Channels with factors of their own, which say nothing of signs and axes."""
+    given = harmonics.convert(light * np.array([[0.8], [1.0], [1.3]]), "jaxsh", "unity")
+    verdict = jaxsh.check(given, image)
+    assert verdict.decided
+    assert verdict.agree == ("unity",)
+    assert verdict.residual < 0.01  # the light is from a larger picture
+    assert verdict.faults == (
+        "its channels are those of the picture times 0.8, 1, 1.3: a white balance, say",
+    )
+
+
 def test_mistakes_of_the_picture(image, light):
     image = image / image.max() * 2
     light = samples.project(image)

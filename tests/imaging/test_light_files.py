@@ -199,6 +199,14 @@ def test_an_archive_keeps_any_convention(tmp_path, rng):
         np.testing.assert_allclose(read_light(path), many, rtol=0, atol=4e-15)
 
 
+def test_an_archive_with_other_axes_has_no_name(tmp_path, rng):
+    light = rng.normal(size=(3, 9))
+    for up, name in ((None, "three.js"), ("y", "three.js"), ("z", "see facts")):
+        path = write_light(tmp_path / "a.npz", light, convention="three.js", up=up)
+        assert str(np.load(path)["convention"]) == name
+        np.testing.assert_allclose(read_light(path), light, rtol=0, atol=4e-15)
+
+
 def test_what_a_format_cannot_hold_is_said(tmp_path, rng):
     light = rng.normal(size=(3, 16))
     with pytest.warns(UserWarning, match=r"a\.json: left out what is above degree 2"):
