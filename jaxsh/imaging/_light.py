@@ -272,8 +272,9 @@ def _content(
     convention: str | Convention,
     facts: Convention,
 ) -> Content:
-    named = isinstance(convention, str) and conventions()[convention].axes == facts.axes
-    name = convention if named else None  # with other axes it is not what has that name
+    name = convention if isinstance(convention, str) else None
+    if name and conventions()[name].axes != facts.axes:  # it is not what has that name
+        name = None
     match suffix:
         case ".json":
             return three_file(values)
