@@ -21,7 +21,7 @@ _EIGHT = np.ones((3, 3))
 class Coarse(NamedTuple):
     """A picture's brightness by cells, and which of its rows and columns each cell has."""
 
-    brightness: Float[np.ndarray, "h w"]  # mean over the cell, all channels summed
+    brightness: Float[np.ndarray, "h w"]  # mean over the cell, all channels summed; never below 0
     solid_angle: Float[np.ndarray, "h w"]
     rows: Int[np.ndarray, " h+1"]
     columns: Int[np.ndarray, " w+1"]
@@ -41,7 +41,8 @@ class Coarse(NamedTuple):
             row = np.einsum("hwc,h->w", image[first:last], weight, dtype=np.float64)
             flux[i] = np.add.reduceat(row, columns[:-1])
             solid_angle[i] = weight.sum() * counts
-        return cls(flux / solid_angle, solid_angle, rows, columns, weights)
+        # What is below zero, as of a picture made from coefficients, is no light to be found.
+        return cls(np.maximum(flux / solid_angle, 0), solid_angle, rows, columns, weights)
 
     def level(self, threshold: float) -> float:
         """The mean m of the brightness where that is cut off at `threshold` times m itself.
@@ -78,7 +79,7 @@ class Coarse(NamedTuple):
                 yield labels == region
             wide = (found & (areas > largest))[labels]
             if wide.any():
-                level *= _STEP
+                level = _next(level, float(self.brightness[wide].min()))
                 waiting.append((level, wide & (self.brightness > level)))
 
 
@@ -92,6 +93,13 @@ def grown(mask: Bool[np.ndarray, "h w"], reach: int) -> Bool[np.ndarray, "h w"]:
         for pole in (0, -1):
             mask[pole] |= mask[pole].any()
     return mask
+
+
+def _next(level: float, least: float) -> float:
+    """The next level that changes anything: where the rest is black, the first is far below."""
+    if level <= 0:
+        return least
+    return level * _STEP ** max(1, np.floor(np.log(least / level) / np.log(_STEP)))
 
 
 def _edges(count: int, block: int) -> Int[np.ndarray, " n"]:

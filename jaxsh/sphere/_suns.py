@@ -10,7 +10,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import as_float, check_degree, check_size
 from .._core.linalg import einsum
-from .._core.vectors import checked_rotation
+from .._core.vectors import checked_rotation, components_first, normalize
 from ..harmonics import convolve, disc, evaluate
 
 _RAYS = 16
@@ -172,7 +172,8 @@ def _rotated(suns: Suns, turn):
 
 
 def _unit(vectors: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3"]:
-    return vectors / jnp.linalg.norm(vectors, axis=-1, keepdims=True)
+    unit, _ = normalize(components_first(vectors))
+    return unit[:, 0].T.reshape(vectors.shape)
 
 
 @jax.jit

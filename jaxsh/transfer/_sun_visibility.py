@@ -25,6 +25,7 @@ from ._bake._directions import spread
 from ._bake._faults import check_arguments
 from ._bake._origins import origins
 from ._bake._receivers import unit_normals
+from ._glossy_kernels import unit
 from ._transfer import SampledTransfer, Transfer
 
 Surface = Mesh | Transfer | SampledTransfer
@@ -233,8 +234,7 @@ def _draws(positions: Float[np.ndarray, "v 3"], seed: int) -> UInt32[np.ndarray,
 @functools.partial(jax.jit, static_argnums=1)
 def aimed(suns: Suns, count: int) -> tuple[Float[Array, "s n 3"], Float[Array, "s 3"]]:
     """Returns rays to each source, all of those with a shape, and the middle that they surround."""
-    middle = suns.direction / jnp.linalg.norm(suns.direction, axis=-1, keepdims=True)
-    return suns.rays(count if suns.shape is None else None), middle
+    return suns.rays(count if suns.shape is None else None), unit(suns.direction.T).T
 
 
 def points_of(surface: Surface) -> tuple[Float[Array, "v 3"], Float[Array, "v 3"]]:

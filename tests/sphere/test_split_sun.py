@@ -1,5 +1,6 @@
 """Sources split from pictures that are made of known ones, and pictures without any."""
 
+import itertools
 import time
 import warnings
 
@@ -133,6 +134,21 @@ def test_a_wide_light_gives_its_peaks_only():
     assert angle(suns.direction, (0.48, 0.6, 0.64)) < 0.01
     assert 0.01 < suns.solid_angle < 0.1
     assert 10 < rest.max() < 40
+
+
+def test_light_below_zero_and_a_dark_room_come_to_an_end():
+    """As of a light made from coefficients; and a wide lamp far above what is else in the room."""
+    image = picture((0.48, 0.6, 0.64))
+    expected, _ = sphere.split_sun(image)
+    image[-20:] = -5.0
+    suns, rest = sphere.split_sun(image)
+    np.testing.assert_allclose(suns.direction, expected.direction, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(suns.irradiance, expected.irradiance, rtol=1e-12)
+    np.testing.assert_array_equal(rest[-20:], image[-20:])
+    for depth, lamp in itertools.product((0.0, 1e-200), (5.0, 1e30)):
+        room = np.where(directions(32, 64)[..., :1] > 0.8, lamp, depth) * np.ones(3)
+        with pytest.warns(UserWarning, match="there is no sun to split off"):
+            sphere.split_sun(room, largest=1e-3)
 
 
 @pytest.mark.slow

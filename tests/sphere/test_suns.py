@@ -61,6 +61,16 @@ def test_a_shape_follows_its_direction(rng):
         np.testing.assert_allclose(cosine, suns.shape[..., 2], rtol=0, atol=1e-15)
 
 
+def test_a_direction_has_any_length(rng):
+    """Also one whose square is none in float32."""
+    suns = shaped(rng, np.float32)
+    expected = suns.rays(4)
+    for length in (1e-25, 1e25):
+        far = np.float32(length) * np.asarray(suns.direction)
+        found = sphere.Suns(far, suns.solid_angle, suns.radiance, suns.shape).rays(4)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=5e-7)
+
+
 def test_fewer_rays_are_middles_of_neighbors(rng):
     suns = shaped(rng)
     middle = suns.rays().reshape(3, 4, 2, 3).sum(axis=2)
