@@ -72,7 +72,8 @@ def fit_daylight(
     - `sky`, `turbidity`: as for `fit_sky`; of a transfer of degree 1 or more.
     - `exposure`: a known factor, 1 where observed is in kcd/m²; None, the default, recovers it.
     - `mask`: False where nothing was observed. `weights`: one over the expected error, at least 0.
-      Where either is zero, or a normal is not finite, observed may hold any number.
+      Where either is zero, or a normal is not finite or zero, observed and albedo may hold any
+      number.
     - `starts`: how many suns are followed to the end, the best of 192 that are looked at.
     - `tolerance`, `max_steps`, `throw`: as for `fit_sky`.
 

@@ -61,7 +61,8 @@ def fit_light(
     - `albedo`: a number, (3,), or of each vertex or pixel with one or three channels.
     - `degree`: of the light; 2 is what a diffuse surface without shadows can tell.
     - `mask`: False where nothing was observed. `weights`: one over the expected error, at least 0.
-      Where either is zero, or a normal is not finite or zero, observed may hold any number.
+      Where either is zero, or a normal is not finite or zero, observed and albedo may hold any
+      number.
     - `materials`: a number 0, 1, … for each place, where colors are not known: one unknown albedo
       for each material, in turn with the light, from gray on. Shading tells color times light
       alone, so the mean of the colors over the pixels, by their squared weights, is `albedo`, a
@@ -83,10 +84,11 @@ def fit_light(
 
     **Returns** a `RecoveredLight` with the light (3, K) in the surface's dtype. Its `confidence` is
     the posterior's, σ and the mean light taken as known: it tells honestly what is unseen as far as
-    the light is one like the probes. Without a prior what is not determined is 0, with an infinite
-    deviation. `determined` tells coefficient by coefficient what the data decided. Normals alone
-    tell nothing of odd bands from 3 on. `statistics.at_bound` tells that `nonnegative` had to act;
-    the confidence does not know of it. That of unknown materials is the light's, colors included.
+    the light is one like the probes. `determined` tells coefficient by coefficient what the data
+    decided. Without a prior what they do not is as little as it can be, with an infinite deviation;
+    so is σ, unless given, where pixels are no more than unknowns. Normals alone tell nothing of odd
+    bands from 3 on. `statistics.at_bound` tells that `nonnegative` had to act; the confidence does
+    not know of it. That of unknown materials is the light's, colors included.
 
     Differentiable in observed, albedo, weights and the surface, for `loss="squares"` without
     `nonnegative` or `materials`: the value, with an estimated σ taken as a constant; all else in

@@ -25,7 +25,7 @@ from ..harmonics import (
 from ..sphere import fibonacci
 from ._light_materials import solve_colored
 from ._light_result import RecoveredLight
-from ._light_solve import Solution, compress_rows, solve_plain, solve_with_prior
+from ._light_solve import Solution, compress_rows, solve_plain, solve_with_prior, width_of
 from ._nonnegative import nonnegative
 from ._result import Confidence, Statistics
 
@@ -244,10 +244,12 @@ def _whole(light, found, scale, relative, columns, options, colors, result, stat
     kept = len(columns)
     spread = jnp.full((3, count), jnp.inf, dtype)
     if relative is not None:
-        spread = relative[None, :count] * light[:, :1] ** 2
+        mean = width_of(found.light[:, 0])[:, None]
+        # Of a channel of which nothing is seen the mean is not known either.
+        spread = jnp.where(found.determined[:, :1] > 0, relative[None, :count] * mean**2, jnp.inf)
     variance = found.noise**2
     inner = found.inverse[:, :kept, :kept]
-    inner = jnp.where(jnp.isfinite(inner), variance * inner, jnp.inf)
+    inner = jnp.where(jnp.isfinite(inner) & jnp.isfinite(variance), variance * inner, jnp.inf)
     value = jnp.zeros((3, count), dtype).at[:, columns].set(light[:, :kept])
     factor = _window(value, options.window, options.degree)
     value = value * factor[None]

@@ -12,7 +12,8 @@ class RecoveredLight(Recovered[Float[Array, "3 k"]]):
       1 - posterior/prior: near 1 the data decide, near 0 the value is the prior's zero and the
       deviation the prior's own. The constant coefficient has no prior; it counts as 1. Without a
       prior it is 1, or 0 where nothing determines the coefficient and its deviation is infinite.
-    - `noise`: the standard deviation of what was observed, at weight 1, as given or as estimated.
+    - `noise`: the standard deviation of what was observed, at weight 1, as given or as estimated;
+      infinite where, without a prior, as many unknowns as pixels leave nothing to estimate it by.
     - `albedo` (M, 3): the colors of the materials where they were unknown, otherwise None.
 
     **Example**

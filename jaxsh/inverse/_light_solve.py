@@ -3,6 +3,7 @@
 All in units in which the weighted data have length 1, on the few rows that hold all of them.
 """
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -78,19 +79,28 @@ def solve_plain(
 
     `count` is the number of pixels with a weight.
     """
-    solver = lx.SVD(rcond=10 * float(jnp.finfo(target.dtype).eps) * operator.shape[-1])
+    rcond = 10 * float(jnp.finfo(target.dtype).eps) * operator.shape[-1]
+    solver = lx.SVD(rcond=rcond)
 
     def one(matrix, b):
         return lx.linear_solve(lx.MatrixLinearOperator(matrix), b, solver).value
 
     light = jax.vmap(one)(operator, target)
     residual = jnp.linalg.norm(target - einsum("crk,ck->cr", operator, light))
-    free = jnp.maximum(3 * (count - operator.shape[-1]), 1)
-    noise = residual / jnp.sqrt(free) if noise is None else noise
+    if noise is None:
+        rank = jax.vmap(functools.partial(jnp.linalg.matrix_rank, rtol=rcond))(operator)
+        free = 3 * count - jnp.sum(rank).astype(count.dtype)
+        # As many unknowns as pixels fit any data: these then do not tell how noisy they are.
+        noise = jnp.where(free > 0.5, residual / jnp.sqrt(jnp.maximum(free, 1)), jnp.inf)
     unit = jnp.ones((), target.dtype)
     inverse = jax.vmap(lambda matrix: covariance(matrix, unit))(operator)
     known = jnp.isfinite(jnp.diagonal(inverse, axis1=1, axis2=2)).astype(target.dtype)
     return Solution(light, inverse, jnp.zeros_like(light), known, noise, residual)
+
+
+def width_of(mean: Float[Array, " 3"]) -> Float[Array, " 3"]:
+    """The mean light of each channel as its prior takes it."""
+    return jnp.maximum(jnp.abs(mean), _LEAST * jnp.max(jnp.abs(mean)))
 
 
 def solve_with_prior(
@@ -117,7 +127,8 @@ def solve_with_prior(
     u, d, vt = jnp.linalg.svd(rest, full_matrices=False)
     y = einsum("cri,cr->ci", u, target[:, 1:])
     across = jnp.sum((target[:, 1:] - einsum("cri,ci->cr", u, y)) ** 2)
-    free = 3 * jnp.maximum(count - count_of, 0)
+    # Fewer pixels than unknowns leave directions that nothing is seen of: taken off here again.
+    free = 3 * (count - count_of)
     head = jnp.where(first[:, 0] == 0, 1, first[:, 0])
     typical = 1 / jnp.sqrt(3 * jnp.maximum(count, 1))  # root mean square of what was observed
 
@@ -139,18 +150,15 @@ def solve_with_prior(
         best = logs[jnp.argmin(improbability(typical * jnp.exp(logs), scale))]
         return typical * jnp.exp(best)
 
-    def floor(mean):
-        return jnp.maximum(jnp.abs(mean), _LEAST * jnp.max(jnp.abs(mean)))
-
     def follow(_, state):
         scale, _ = state
         level = most_probable(scale)
         gain = scale[:, None] * d
         pulled = gain / (gain**2 + level**2) * y
         others = scale[:, None] * widths[None] * einsum("cik,ci->ck", vt, pulled)
-        return floor((target[:, 0] - jnp.sum(first[:, 1:] * others, axis=1)) / head), level
+        return width_of((target[:, 0] - jnp.sum(first[:, 1:] * others, axis=1)) / head), level
 
-    start = floor(target[:, 0] / head), jnp.zeros((), dtype)
+    start = width_of(target[:, 0] / head), jnp.zeros((), dtype)
     scale, level = jax.lax.fori_loop(0, _PASSES, follow, start)
     spreads = (scale[:, None] * widths[None]) ** 2
     spreads = jnp.where(spreads > 0, spreads, 1)

@@ -31,8 +31,8 @@ def as_rows(
     """Flattens observed (..., 3), and what belongs to it, to V rows.
 
     A surface of normals (..., 3) becomes an unshadowed transfer of the degree; a `Transfer` stays
-    as it is. Where the mask is false, or a normal is not finite or zero, the weight is 0. Raises as
-    `check_data` does, and for shapes that do not fit.
+    as it is. Where the mask is false, or a normal is not finite or zero, the weight is 0; albedo
+    and weights may then be no numbers. Raises as `check_data` does, and for shapes that do not fit.
     """
     observed, albedo = as_float(observed, "observed"), as_float(albedo, "albedo")
     given = isinstance(surface, Transfer)
@@ -43,21 +43,32 @@ def as_rows(
     if observed.shape != normals.shape:
         raise ValueError(f"expected observed {normals.shape}, got shape {observed.shape}")
     places = normals.shape[:-1]
-    if len(places) > 1 and albedo.shape[:-1] == places:
+    each = albedo.ndim > 1 and albedo.shape[:-1] == places
+    if each:
         albedo = albedo.reshape(-1, albedo.shape[-1])
-    normals = normals.reshape(-1, 3)
-    seen = jnp.all(jnp.isfinite(normals), axis=1) & jnp.any(normals != 0, axis=1)
+    elif len(places) > 1 and albedo.ndim > 1:
+        raise ValueError(
+            f"expected albedo as a number, (3,), {(*places, 1)} or {(*places, 3)}, got shape "
+            f"{albedo.shape}"
+        )
+    seen = jnp.all(jnp.isfinite(normals), axis=-1) & jnp.any(normals != 0, axis=-1)
     if mask is not None:
         check_type("mask", mask, Array, np.ndarray)
         given_mask = jnp.asarray(mask)
         if given_mask.shape != places or given_mask.dtype != bool:
             raise ValueError(f"expected mask {places} of booleans, got {described(mask)}")
-        seen = seen & given_mask.reshape(-1)
+        seen = seen & given_mask
+    normals = normals.reshape(-1, 3)
     transfer = surface if given else unshadowed(jnp.zeros_like(normals), normals, degree)
     if weights is None:
-        weights = seen.astype(transfer.dtype)
+        weights = seen.reshape(-1).astype(transfer.dtype)
     else:
-        weights = jnp.where(seen, of_places("weights", weights, places), 0)
+        weights = as_float(weights, "weights")
+        if weights.shape == places:  # where nothing is seen they need be no numbers
+            weights = jnp.where(seen, weights, 0)
+        weights = of_places("weights", weights, places)
+    if each:
+        albedo = jnp.where(weights[:, None] > 0, albedo, 0)
     data = check_data(observed.reshape(-1, 3), transfer, albedo, weights)
     return Rows(data[0], transfer, *data[1:])
 

@@ -101,9 +101,14 @@ def test_posterior(seen):
     assert np.sqrt(np.mean(np.square(error))) == pytest.approx(1, abs=0.4)
 
 
-def test_noise_is_the_most_probable(seen):
-    """The level of noise is the peak of SciPy's density, the mean's prior wide instead of flat."""
+@pytest.mark.parametrize("pixels", [slice(0, COUNT), slice(8, 16)])
+def test_noise_is_the_most_probable(pixels, seen):
+    """The level of noise is the peak of SciPy's density, the mean's prior wide instead of flat.
+
+    Eight pixels are fewer than the nine unknowns.
+    """
     normals, albedo, weights, _, observed = seen
+    weights[np.delete(np.arange(COUNT), pixels)] = 0
     found = fits(None)(observed, normals, albedo, weights)
     rows = weights > 0
     operator = matrix(normals, 3)[rows]
@@ -122,7 +127,9 @@ def test_noise_is_the_most_probable(seen):
 
     best = scipy.optimize.minimize_scalar(improbability, bounds=(-7, -2), method="bounded")
     assert np.log(float(found.noise)) == pytest.approx(best.x, abs=0.02)
-    assert float(found.noise) == pytest.approx(NOISE, rel=0.25)
+    assert float(found.noise) == pytest.approx(
+        NOISE, rel=0.25 if len(weights[pixels]) == COUNT else 1
+    )
     assert 0 < found.statistics.residual < 0.02
 
 
@@ -162,6 +169,36 @@ def test_plain_least_squares_tells_what_is_unseen(degree, rng):
     assert np.all(found.value[:, 9:] == 0)
     assert np.all(found.confidence.deviation[:, 9:] == np.inf)
     assert np.all(found.determined[:, 9:] == 0)
+
+
+@pytest.mark.slow
+def test_as_many_unknowns_as_pixels_do_not_tell_the_noise(rng):
+    """Rank is what counts: of a transfer without shadows bands 3 are zero."""
+    normals = cap(rng, 12)
+    observed = 0.5 * matrix(normals, 3) @ some_light(rng, 3).T + 0.01 * rng.normal(size=(12, 3))
+    made = transfer.unshadowed(normals, normals, 3)
+    weights = np.ones(12)
+    fit = jax.jit(lambda w: inverse.fit_light(observed, made, 0.5, 2, weights=w, prior=None))
+    _, squared, *_ = np.linalg.lstsq(0.5 * matrix(normals, 2), observed)
+    assert float(fit(weights).noise) == pytest.approx(np.sqrt(squared.sum() / 9), rel=1e-2)
+    weights[9:] = 0
+    found = fit(weights)
+    assert found.noise == np.inf
+    assert np.all(found.confidence.deviation == np.inf)
+    assert not np.any(np.isnan(found.confidence.covariance))
+
+
+@pytest.mark.slow
+def test_channel_that_reflects_nothing(seen):
+    """Nothing is known of its light, nor of bands that normals do not tell."""
+    normals, albedo, weights, _, observed = seen
+    albedo[:, 1] = 0
+    albedo[5] = np.nan  # has no weight
+    found = inverse.fit_light(observed, normals, albedo, 3, weights=weights, prior=PRIOR)
+    assert np.all(found.value[1] == 0)
+    assert np.all(found.determined[1] == 0)
+    assert np.all(found.confidence.deviation[1] == np.inf)
+    assert np.all(found.confidence.deviation[::2, 9:] > 0.5)
 
 
 @pytest.mark.slow
@@ -250,6 +287,7 @@ def test_errors(rng, unchecked):
         ((observed, normals, 0.5, 2), {"prior": np.zeros(3)}, "finite and > 0, got 0"),
         ((observed, normals, 0.5, 2), {"noise": 0.0}, "noise must be a number > 0"),
         ((observed[:-1], normals, 0.5, 2), {}, r"expected observed \(48, 3\)"),
+        ((observed[None], normals[None], np.ones((1, COUNT)), 2), {}, r"\(1, 48, 1\) or"),
         ((0 * observed, normals, 0.5, 2), {}, "no light to recover"),
         ((np.nan * observed, normals, 0.5, 2), {}, "give them weight 0"),
     ]:
