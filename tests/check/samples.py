@@ -1,16 +1,13 @@
 """Lights and bases by hand, in NumPy alone: nothing here comes from the table that is checked."""
 
-import math
-
 import numpy as np
 
 # The constants of degree 2 as they stand in papers and in code.
 CONSTANTS = np.array(
     [0.282095, 0.488603, 0.488603, 0.488603, 1.092548, 1.092548, 0.315392, 1.092548, 0.546274]
 )
-# Of the coefficients 0 to 8: the clamped cosine, as in Ramamoorthi & Hanrahan 2001.
-LAMBDAS = np.array([math.pi, *[2 * math.pi / 3] * 3, *[math.pi / 4] * 5])
 CS = np.array([1, -1, 1, -1, 1, -1, 1, -1, 1.0])
+DIRECTION = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
 
 
 def polynomials(directions):
