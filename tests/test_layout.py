@@ -34,6 +34,7 @@ FLOORS = {
 # Private files that another module may import.
 DOORS = {
     "harmonics._convention",
+    "harmonics._conventions",
     "harmonics._tables",
     "harmonics._turns",
     "transfer._glossy_kernels",

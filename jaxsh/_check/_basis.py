@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from ..harmonics import conventions, convert, degrees
+from ..harmonics._tables import exact_grid
 from ._decide import Case, cases, decide
 from ._given import MOST, Light, Reading
 from ._known import judge
 from ._matching import constants, described, match
-from ._placements import grid, values
 from ._space import Space, space
 from ._verdict import Verdict
 from ._words import factor, facts, percent
@@ -78,7 +78,7 @@ def _as_case(matrix: np.ndarray, table: Space) -> Case:
 
 def _look(function: Callable) -> Seen:
     notes = []
-    first = _called(function, grid(0)[0], notes)
+    first = _called(function, exact_grid(0, 0).directions, notes)
     count = first.shape[1]
     if count == 0 or math.isqrt(count) ** 2 != count:
         raise ValueError(
@@ -88,16 +88,17 @@ def _look(function: Callable) -> Seen:
     degree = math.isqrt(count) - 1
     if degree > MOST:
         raise ValueError(f"expected a basis of degree {MOST} or less, got degree {degree}")
-    directions, weights = grid(degree + 4)
-    basis = _called(function, directions, [])
+    # Exact for functions of up to four degrees above, of which it shows what is beyond.
+    grid = exact_grid(2 * (degree + 4), degree)
+    basis = _called(function, grid.directions, [])
     if not np.isfinite(basis).all():
         raise ValueError("expected finite values of the basis, got NaN or infinite ones")
     at_axes = np.concatenate([np.eye(3), -np.eye(3)])
     with np.errstate(all="ignore"):
         if not np.isfinite(_called(function, at_axes, [])).all():
             notes.append("it gives NaN or infinite values in the direction of an axis")
-    matrix = (basis * weights[:, None]).T @ values(directions, degree)
-    whole = weights @ basis**2
+    matrix = (basis * grid.weights[:, None]).T @ grid.basis.T
+    whole = grid.weights @ basis**2
     inside = np.sum(matrix**2, axis=1)
     beyond = np.sqrt(np.maximum(1 - inside / np.where(whole > 0, whole, 1), 0)) * (whole > 0)
     matrix[np.abs(matrix) < 1e-9 * np.abs(matrix).max()] = 0.0

@@ -234,7 +234,7 @@ def furnace(found: list[Case], space: Space) -> Verdict:
     ratio = float(given @ light / (light @ light))
     spread = float(np.linalg.norm(given - ratio * light) / np.linalg.norm(given))
     rest = float(np.abs(case.reading.channels[:, 1:]).max(initial=0.0) / np.abs(given).max())
-    agree, nearly = [], {}
+    agree = []
     for name, at in space.named.items():
         constant = space.norm_table[at.normalization, 0] * space.quantity_table[at.quantity, 0]
         if near_one(ratio / constant, spread):
@@ -253,7 +253,6 @@ def furnace(found: list[Case], space: Space) -> Verdict:
         decided=False,
         summary=f"a light of radiance 1 has {factor(ratio * math.sqrt(4 * math.pi))} here",
         agree=() if faults else tuple(agree),
-        nearly=nearly,
         faults=tuple(faults),
         open=(
             "a constant light is the same in all axes, signs and orders; a picture with something "

@@ -114,6 +114,12 @@ def handmade_orders(degree: int) -> dict[str, tuple[tuple[int, int], ...]]:
     return {name: tuple(sorted(pairs, key=lambda p, k=key: k(*p))) for name, key in keys.items()}
 
 
+def irradiance_factors(degree: int) -> Float[np.ndarray, " bands"]:
+    """Tabulate what each degree of radiance is multiplied by to give irradiance."""
+    zonal = np.asarray(clamped_cosine(degree), np.float64)
+    return zonal * np.sqrt(4 * np.pi / (2 * np.arange(degree + 1) + 1))
+
+
 @functools.lru_cache(maxsize=32)
 def space(degree: int, whole: int, *, basis: bool = False) -> Space:
     """Tabulate all combinations up to a degree, of coefficients that go up to degree `whole`.
@@ -135,8 +141,7 @@ def space(degree: int, whole: int, *, basis: bool = False) -> Space:
             sequences.append(convention.order)
     scale = np.stack([scales(Convention(normalization=name), degree) for name in kept])
     signs = [scales(Convention(phase=name), degree) for name in PHASES]
-    zonal = np.asarray(clamped_cosine(degree), np.float64)
-    lambdas = (zonal * np.sqrt(4 * np.pi / (2 * np.arange(degree + 1) + 1)))[degrees(degree)]
+    lambdas = irradiance_factors(degree)[degrees(degree)]
     table = {"radiance": np.ones(count), "irradiance": lambdas, "irradiance/pi": lambdas / np.pi}
     stands = [places(Convention(order=order), whole)[:count] for order in sequences]
     norm_table = scale if basis else 1 / scale

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from ..harmonics import clamped_cosine, degrees, window
+from ..harmonics import degrees, window
 from ._decide import LIKELY, Case, Choice, beside
 from ._search import FLOOR, numbers, threshold
-from ._space import Combination, Space
+from ._space import Combination, Space, irradiance_factors
 from ._words import factor, percent
 
 # How much larger the error of every other convention must be.
@@ -73,11 +73,10 @@ def look_for_window(found: list[Case], space: Space) -> Windowed | None:
 def kernels(degree: int) -> dict[tuple[str, str], Float[np.ndarray, " bands"]]:
     """Factors of each degree by window and quantity; irradiance is that over π."""
     steps = np.arange(degree + 1)
-    zonal = np.asarray(clamped_cosine(degree), np.float64)
-    zonal = zonal * np.sqrt(4 * np.pi / (2 * steps + 1)) / np.pi
+    over_pi = irradiance_factors(degree) / np.pi
     return {
         (kind, quantity): kernel * np.asarray(window(kind, degree), np.float64)[steps**2]
-        for quantity, kernel in (("radiance", np.ones(degree + 1)), ("irradiance", zonal))
+        for quantity, kernel in (("radiance", np.ones(degree + 1)), ("irradiance", over_pi))
         for kind in _KINDS
     }
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from ..harmonics import Convention
+from ..harmonics._convention import axes_rows
 from ._space import handmade_orders
 
 _PHASES = {"none": "no Condon–Shortley sign", "condon-shortley": "Condon–Shortley"}
@@ -74,10 +75,7 @@ def axes(convention: Convention) -> str:
     up = next(i for i, axis in enumerate(own) if axis[1] == "z")
     sign = "" if own[up][0] == "+" else "−"
     words = f"{sign}{'xyz'[up]} up"
-    matrix = np.zeros((3, 3))
-    for row, axis in enumerate(own):
-        matrix[row, "xyz".index(axis[1])] = float(axis[0] + "1")
-    if np.linalg.det(matrix) < 0:
+    if np.linalg.det(axes_rows(own)) < 0:
         words += ", left-handed"
     if own != ("+x", "+y", "+z"):
         ours = ", ".join(axis.replace("-", "−").replace("+", "") for axis in own)
@@ -102,8 +100,3 @@ def percent(error: float) -> str:
     if not math.isfinite(error):
         return "no fit"
     return f"{100 * error:.1f} %" if error >= 5e-4 else "below 0.1 %"
-
-
-def names(count: int, noun: str) -> str:
-    """A number with its noun."""
-    return f"{count} {noun}" + ("" if count == 1 else "s")

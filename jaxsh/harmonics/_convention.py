@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -159,13 +160,17 @@ _POLYNOMIAL = _polynomial_constants()
 def axes_matrix(convention: Convention) -> Int[np.ndarray, "3 3"]:
     """The signed permutation from our directions to the arguments x, y, z of the package's basis.
 
-    Rows of `axes` say where the package's axes lie in ours, so that its coordinates are their
-    products with our direction.
+    The package's coordinates are the products of `axes_rows` with our direction.
     """
+    return axes_rows(convention.axes)[["xyz".index(axis) for axis in convention.basis_axes]]
+
+
+def axes_rows(axes: Sequence[str]) -> Int[np.ndarray, "3 3"]:
+    """Say in rows where a package's x, y and z axis lie in ours."""
     rows = np.zeros((3, 3), np.int64)
-    for row, axis in enumerate(convention.axes):
+    for row, axis in enumerate(axes):
         rows[row, "xyz".index(axis[1])] = int(axis[0] + "1")
-    return rows[["xyz".index(axis) for axis in convention.basis_axes]]
+    return rows
 
 
 def _set(convention: Convention, field: str, value) -> None:

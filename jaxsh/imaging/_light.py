@@ -18,19 +18,18 @@ from .._core.checks import (
     check_coefficients,
     check_finite,
     check_size,
-    described,
-    nearest,
 )
 from .._core.files import Content, check_place, put_in_place
 from .._core.words import reason
 from ..harmonics import Convention, conventions, convert, rotate
+from ..harmonics._convention import axes_rows
+from ..harmonics._conventions import look_up
 from ._light_files import (
     FORMATS,
     SAYS,
     Stored,
     cmgen_file,
     gltf_file,
-    lands,
     npz_file,
     read_stored,
     three_file,
@@ -110,13 +109,8 @@ def read_light(
 
 
 def _check_options(convention: str | Convention | None, up: str | None) -> None:
-    known = conventions()
-    named = isinstance(convention, str) and convention in known
-    if convention is not None and not named and not isinstance(convention, Convention):
-        raise ValueError(
-            "expected convention as a Convention or a name of harmonics.conventions(), got "
-            f"{described(convention)}{nearest(convention, known)}"
-        )
+    if convention is not None:
+        look_up("convention", convention)
     if up is not None:
         check_choice("up", up, ("z", "y"))
 
@@ -135,7 +129,7 @@ def _check_suffix(path: Path, what: str) -> None:
 
 def _facts(convention: str | Convention, up: str | None, layout: str | None) -> Convention:
     """Give the convention of a file's numbers: its layout and axes may be others than usual."""
-    facts = conventions()[convention] if isinstance(convention, str) else convention
+    facts = look_up("convention", convention)
     changed = {"axes": f"{up}-up"} if up else {}
     if layout:
         changed["layout"] = layout
@@ -172,7 +166,7 @@ def _in_ours(
         raise ValueError(f"its numbers are beyond the range of {light.dtype}")
     if stored.rotation is None:
         return jnp.asarray(light)
-    axes = lands(facts)
+    axes = axes_rows(facts.axes)
     rotation = axes.T @ stored.rotation @ axes
     return rotate(light, rotation.astype(light.dtype))
 

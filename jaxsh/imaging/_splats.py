@@ -17,6 +17,7 @@ from .._core.checks import as_float, as_path, check_choice, check_coefficients, 
 from .._core.files import check_place, put_in_place
 from .._core.words import reason
 from ..harmonics import conventions, convert
+from ..harmonics._convention import axes_rows
 from ._light_files import SplatArrays, put_splats, read_splat_arrays, splats_problem
 
 _HALF = math.sqrt(0.5)
@@ -214,9 +215,8 @@ def _turned(arrays: SplatArrays, up: str, *, back: bool = False) -> SplatArrays:
     coefficients = _in_convention(arrays.coefficients, axes, back)
     if up == "z":
         return arrays._replace(coefficients=coefficients)
-    # Its rows are where the axes land: `positions @ lands` puts them there.
-    lands = np.array([[int(axis[0] + "1") * (axis[1] == b) for b in "xyz"] for axis in axes])
-    positions = arrays.positions @ (lands.T if back else lands).astype(arrays.positions.dtype)
+    rows = axes_rows(axes)
+    positions = arrays.positions @ (rows.T if back else rows).astype(arrays.positions.dtype)
     rotations = arrays.rotations
     if rotations is not None:
         a, b = rotations.dtype.type(a), rotations.dtype.type(-b if back else b)

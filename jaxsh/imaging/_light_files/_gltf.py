@@ -29,8 +29,10 @@ def read_gltf(path: Path, which: str | int | None) -> Stored:
     rows = listed(light, "irradianceCoefficients", owner)
     if len(rows) != 9:
         raise ValueError(f"{owner} should have 9 rows as 'irradianceCoefficients', got {len(rows)}")
-    values = [numbers({"row": row}, "row", f"{owner}, coefficient {i},", 3, None) for i, row in
-              enumerate(rows)]  # fmt: skip
+    values = [
+        numbers({"row": row}, "row", f"{owner}, coefficient {i},", 3, None)
+        for i, row in enumerate(rows)
+    ]
     intensity = number(light, "intensity", owner, 1.0)
     rotation = numbers(light, "rotation", owner, 4, [0.0, 0.0, 0.0, 1.0])
     return Stored(np.array(values) * intensity, "gltf", "channels-last", _matrix(rotation, owner))

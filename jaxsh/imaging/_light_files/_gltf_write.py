@@ -10,8 +10,8 @@ from jaxtyping import Float, UInt8
 
 from ..._core.gltf import glb
 from ...harmonics import Convention, evaluate
+from ...harmonics._convention import axes_rows
 from .._layouts import face_directions
-from ._stored import lands
 
 NAME = "EXT_lights_image_based"
 _SIZE = 16  # pixels of a face: the light is smooth
@@ -62,7 +62,7 @@ def _data_uri(picture: bytes) -> str:
 def _pictures(light: Float[np.ndarray, "3 9"], facts: Convention) -> list[bytes]:
     """Give the faces +x, -x, +y, -y, +z, -z of the file's axes, as they are seen from inside."""
     # OpenGL's faces, each turned over its vertical axis, as the specification has it.
-    directions = face_directions(_SIZE)[:, :, ::-1] @ lands(facts)
+    directions = face_directions(_SIZE)[:, :, ::-1] @ axes_rows(facts.axes)
     basis = np.asarray(evaluate(directions.astype(light.dtype), 2))
     return [_png(_rgbd(np.maximum(face @ light.T, 0))) for face in basis]
 

@@ -54,8 +54,8 @@ def read_splat_arrays(data: bytes) -> tuple[SplatArrays, str]:
         _stacked(columns, rotations) if rotations else None,
     )
     found += _ignored(columns, used)
-    found += [f"{one.rows} elements {one.name!r} ignored" for one in header.elements
-              if one.name != "vertex" and one.rows]  # fmt: skip
+    others = [one for one in header.elements if one.name != "vertex" and one.rows]
+    found += [f"{one.rows} elements {one.name!r} ignored" for one in others]
     return arrays, ", ".join(found)
 
 
@@ -83,9 +83,7 @@ def _coefficients(
 ) -> Float[np.ndarray, "n 3 k"]:
     """Give (n, 3, K): a channel's constant, then its own share of the rest."""
     each = len(rest) // 3
-    names = [
-        name for c in range(3) for name in (constant[c], *rest[c * each : (c + 1) * each])
-    ]  # fmt: skip
+    names = [name for c in range(3) for name in (constant[c], *rest[c * each : (c + 1) * each])]
     return _stacked(columns, names).reshape(-1, 3, each + 1)
 
 

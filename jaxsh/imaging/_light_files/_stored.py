@@ -42,11 +42,5 @@ def choose(what: str, names: Sequence[str], which: str | int | None, default: in
     return names.index(which)
 
 
-def lands(convention: Convention) -> Float[np.ndarray, "3 3"]:
-    """Give where the x, y and z of a convention land in our axes, in rows."""
-    rows = [[int(end[0] + "1") * (end[1] == one) for one in "xyz"] for end in convention.axes]
-    return np.array(rows, np.float64)
-
-
 def _listed(names: Sequence[str]) -> str:
     return reason(", ".join(repr(name) for name in names), 120) or "none"
