@@ -27,7 +27,7 @@ def draw_lights(
         "dering of the light": _shown(clean, exposure),
         "sources split off": _shown(without, exposure),
     }
-    figure, axes = plt.subplots(1, len(panels), figsize=(11, 1.75), layout="constrained")
+    figure, axes = plt.subplots(1, len(panels), figsize=(11, 1.6), layout="constrained")
     for axis, (title, panel) in zip(axes, panels.items(), strict=True):
         axis.imshow(panel, extent=(0, 2, 0, 1))
         axis.set_title(title, fontsize=10)

@@ -63,8 +63,9 @@ def split_sun(
     **Returns** the `Suns`, brightest first, and the picture without them, in its dtype. What is
     taken from the picture is in the suns: integrals over the sphere (weights of `lat_long`) agree
     to rounding. There are fewer than `count` where no more stand out: none at all, with a
-    `UserWarning`, under an overcast sky or in a picture that is black or uniform, and where
-    clipping has left nothing bright. Runs in NumPy on the host, before `jit`, `vmap` and `grad`.
+    `UserWarning`, under an overcast sky or in a picture that is black or uniform, where clipping
+    has left nothing bright, and where what stands out is wider than `largest`, as it then says.
+    Runs in NumPy on the host, before `jit`, `vmap` and `grad`.
     Raises `ValueError` for a picture that `project_lat_long` would refuse, one with NaN or
     infinite values, or without three channels.
 
@@ -100,9 +101,12 @@ def split_sun(
         if source.flux.any():
             sources.append(source)
     if not sources:
+        wide = _brightest(coarse, 1, threshold, 4 * np.pi, least)
+        width = coarse.solid_angle[wide[0]].sum() if wide else 0.0
         warnings.warn(
             "there is no sun to split off: nothing compact in the picture stands out of its "
-            f"surroundings with {100 * least:g} % of the light",
+            f"surroundings with {100 * least:g} % of the light"
+            + (f"; what does is {width:.2g} sr wide, more than {largest=:g}" if wide else ""),
             UserWarning,
             stacklevel=2,
         )

@@ -98,8 +98,10 @@ class Suns(eqx.Module):
     def harmonics(self, degree: int) -> Float[Array, "3 k"]:
         """Project all of the sources onto the basis: coefficients of their light together.
 
-        Added to those of the rest, they are the coefficients of the picture that `split_sun` has
-        split. Of discs in closed form, otherwise the sum over their rays.
+        Of discs in closed form, otherwise the sum over their rays. Added to those of the rest, they
+        are the coefficients of the picture that `split_sun` has split, but for rays that fill
+        pixels, which `project_lat_long` takes at their middles, and that may be few: at degree 10
+        to 0.3 % of `imaging.studio(64, 128)`.
 
         **Example**
 

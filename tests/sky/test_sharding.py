@@ -1,5 +1,7 @@
 """The sky on a mesh of devices: suns, views and lights keep their sharding."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -50,7 +52,7 @@ def test_many_views_of_one_sky(sky_of):
 @pytest.mark.slow
 def test_stored_fits(sky_of):
     _, *suns = sky_of
-    window = lambda s, t: sky.preetham_harmonics(s, t, 2, window="hann")  # noqa: E731
+    window = functools.partial(sky.preetham_harmonics, degree=2, window="hann")
     gradient = jax.grad(lambda s, t: sky.preetham_harmonics(s, t, 1).sum())
     fit = sky.preetham_table("small", 2)
     for function in (window, gradient, lambda s, t: fit(s, t)):
@@ -59,14 +61,16 @@ def test_stored_fits(sky_of):
 
 def test_projection(sky_of):
     _, *suns = sky_of
-    exact = lambda s, t: sky.project_preetham(s, t, 1)  # noqa: E731
+    exact = functools.partial(sky.project_preetham, degree=1)
     check_sharded(exact, suns, (ROWS,) * 2, ROWS)
 
     def glow(view, sun, haze):
         return jnp.exp(haze * (view @ sun))[:, None]
 
     def slopes(sun, haze):  # of a sky that compiles faster
-        value = lambda s, h: sky.project(glow, s, h, degree=1, symmetric=True)[..., 2].sum()  # noqa: E731
+        def value(s, h):
+            return sky.project(glow, s, h, degree=1, symmetric=True)[..., 2].sum()
+
         return jax.grad(value, (0, 1))(sun, haze)
 
     check_sharded(slopes, suns, (ROWS,) * 2, (ROWS, ROWS))
@@ -76,10 +80,13 @@ def test_projection(sky_of):
 def test_batches_of_two_axes(sky_of):
     """Suns by turbidities: one axis is shared out, and never made one with the other."""
     _, sun, turbidity = sky_of
-    stored = lambda s, t: sky.preetham_harmonics(s[:, None], t, 1)  # noqa: E731
-    smallest = lambda s, t: sky.smallest_luminance(s[:, None], t)  # noqa: E731
-    for function in (stored, smallest):
-        check_sharded(function, (sun, turbidity[:3]), (ROWS, WHOLE), ROWS)
+    for function in (functools.partial(sky.preetham_harmonics, degree=1), sky.smallest_luminance):
+        check_sharded(
+            lambda s, t, function=function: function(s[:, None], t),
+            (sun, turbidity[:3]),
+            (ROWS, WHOLE),
+            ROWS,
+        )
 
 
 @pytest.mark.parametrize(
@@ -88,7 +95,7 @@ def test_batches_of_two_axes(sky_of):
 )
 def test_smallest_luminance(sky_of, reading):
     _, *suns = sky_of
-    smallest = lambda s, t: sky.smallest_luminance(s, t, reading=reading, degree=1)  # noqa: E731
+    smallest = functools.partial(sky.smallest_luminance, reading=reading, degree=1)
     check_sharded(smallest, suns, (ROWS,) * 2, ROWS)
 
 
@@ -106,8 +113,9 @@ def test_ground_and_errors(rng):
     low = rng.uniform(1, 2, size=(COUNT, 3))
     check_sharded(lambda c: sky.with_ground(c, 0.3), (light,), (ROWS,), ROWS)
     check_sharded(lambda c: sky.horizontal_irradiance(c), (light,), (ROWS,), ROWS)
-    error = lambda a, b, s: tuple(sky.fit_error(a, b, s))  # noqa: E731
-    check_sharded(error, (light, exact, low), (ROWS,) * 3, (ROWS, ROWS))
+    check_sharded(
+        lambda *a: tuple(sky.fit_error(*a)), (light, exact, low), (ROWS,) * 3, (ROWS, ROWS)
+    )
 
 
 def test_another_device_than_the_first(sky_of):

@@ -80,7 +80,9 @@ def test_irradiance_of_a_shared_light(rng):
 @pytest.mark.slow
 def test_irradiance_of_a_light_for_each_normal(rng):
     def everything(lights, normals):
-        loss = lambda *arguments: jnp.sum(sphere.irradiance(*arguments) ** 2)  # noqa: E731
+        def loss(*arguments):
+            return jnp.sum(sphere.irradiance(*arguments) ** 2)
+
         return sphere.irradiance(lights, normals), jax.grad(loss, (0, 1))(lights, normals)
 
     arguments = rng.normal(size=(COUNT, 3, 9)), rng.normal(size=(COUNT, 3))

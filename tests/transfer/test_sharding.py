@@ -77,9 +77,8 @@ def test_its_gradient(frame):
 
     light, made, _, material = frame
     rest = made.positions, made.normals, made.neighbors
-    slope = lambda *arguments: jax.grad(loss)(*arguments)  # noqa: E731
     arguments = made.coefficients, light, material.diffuse, rest
-    check_sharded(slope, arguments, (ROWS, WHOLE, ROWS, ROWS), ROWS)
+    check_sharded(jax.grad(loss), arguments, (ROWS, WHOLE, ROWS, ROWS), ROWS)
 
 
 def test_eight_bits(frame, rng):
