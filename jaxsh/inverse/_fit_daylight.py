@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float
 
-from .._core.checks import check_function, check_number, check_size
+from .._core.checks import check_function, check_number, check_size, is_concrete
 from .._core.linalg import matmul
 from .._core.xla import on_mesh
 from ..harmonics import degree_of, evaluate
@@ -66,7 +66,8 @@ def fit_daylight(
     **Arguments**
 
     - `observed`: radiance that leaves the surface, linear: (V, 3), or a picture (H, W, 3).
-    - `surface`: the vertices' `Transfer`, or normals, of the shape of `observed`.
+    - `surface`: the vertices' `Transfer`, or normals, of the shape of `observed`, as for
+      `fit_light`.
     - `albedo`: a number, (3,), or of each vertex or pixel with one or three channels.
     - `sunlit`: from 0 to 1, of each vertex or pixel.
     - `sky`, `turbidity`: as for `fit_sky`; of a transfer of degree 1 or more.
@@ -90,7 +91,7 @@ def fit_daylight(
     to some percent of red; here no channel is below 0.
 
     Raises `ValueError` for shapes that do not fit, and, where values are known, for data that are
-    not finite, all zero, or weighted by less than 0.
+    not finite, all zero, or weighted by less than 0, and for `sunlit` out of [0, 1].
 
     Vertices may be shared out over a mesh of devices.
 
@@ -124,7 +125,13 @@ def fit_daylight(
         raise ValueError("daylight needs a transfer of degree >= 1, got degree 0")
     dtype = rows.observed.dtype
     if sunlit is not None:
-        sunlit = of_places("sunlit", sunlit, np.shape(observed)[:-1]).astype(dtype)
+        sunlit = of_places("sunlit", sunlit, np.shape(observed)[:-1])
+        if is_concrete(sunlit) and not bool(jnp.all((sunlit >= 0) & (sunlit <= 1))):
+            raise ValueError(
+                f"sunlit must be from 0 to 1, got {float(sunlit.min()):g} to "
+                f"{float(sunlit.max()):g}"
+            )
+        sunlit = sunlit.astype(dtype)
     elif rows.transfer is not surface:
         sunlit = jnp.ones_like(rows.weights)
     recovered = _fit(

@@ -57,7 +57,8 @@ def fit_light(
 
     - `observed`: radiance that leaves the surface, linear: (V, 3), or a picture (H, W, 3).
     - `surface`: the vertices' `Transfer`, or normals of the shape of `observed`, of any length, in
-      the axes that the light shall have; these see all of the sphere above their own horizon.
+      the axes that the light shall have; these see all of the sphere above their own horizon. From
+      a picture that codes them as colors n/2 + 1/2 decode them before: 2 color - 1.
     - `albedo`: a number, (3,), or of each vertex or pixel with one or three channels.
     - `degree`: of the light; 2 is what a diffuse surface without shadows can tell.
     - `mask`: False where nothing was observed. `weights`: one over the expected error, at least 0.
@@ -70,7 +71,8 @@ def fit_light(
     - `prior`: `"probes"`, `light_variances`; or variances of your own of the bands 1, 2, …, as many
       as there are unknown bands, at least `degree`; or None for least squares alone.
     - `noise`: the standard deviation σ of what was observed at weight 1. By default it is
-      estimated: by the largest marginal likelihood, or without a prior from the residuals.
+      estimated: by the largest marginal likelihood, or without a prior from the residuals. Of fewer
+      than about ten pixels it may come out far too small, and the light as too sure: give it then.
     - `loss`: `"squares"`; or, against highlights and shadows that the surface does not account
       for, `"huber"` or `"cauchy"` of a pixel's length of error, with the thresholds 1.345 σ and
       2.385 σ. Iterated reweighting, from squares on; σ by the median unless given.

@@ -75,17 +75,17 @@ def recover(
         fine = jnp.all(jnp.isfinite(rows), axis=1) & jnp.any(rows != 0, axis=1)
         return _irradiance_rows(jnp.where(fine[:, None], rows, up), bands)[:, columns]
 
-    def solve(operator, target, count, scale) -> Solution:
-        level = None if noise is None else noise / scale
+    def solve(operator, target, count, scale, level=None) -> Solution:
+        level = level if noise is None else noise / scale
         if relative is None:
             return solve_plain(operator, target, count, level)
         return solve_with_prior(operator, target, relative[columns], count, level)
 
-    def solve_rows(observed, rows, albedo, trust) -> tuple[Solution, Array]:
+    def solve_rows(observed, rows, albedo, trust, level=None) -> tuple[Solution, Array]:
         small = compress_rows(observed, rows, albedo, trust, make)
         operator = jnp.broadcast_to(small.operator, (3, *small.operator.shape[1:])) / small.scale
         count = jnp.sum(trust > 0).astype(dtype)
-        return solve(operator, small.target, count, small.scale), small.scale
+        return solve(operator, small.target, count, small.scale, level), small.scale
 
     data = jax.lax.stop_gradient((observed, rows, albedo))
     trust = jax.lax.stop_gradient(weights)
@@ -100,17 +100,21 @@ def recover(
         found, scale = solve_rows(*data, trust)
     else:
 
-        def again(share, _):
-            """Shares with which pixels count, from those with which they did."""
-            found, scale = solve_rows(*data, trust * jnp.sqrt(share))
-            error = _length(found.light, *data, trust, make)
-            level = _level(error, trust) if noise is None else noise
-            return _SHARES[options.loss](error / level), (found, scale)
+        def judged(found, scale):
+            """Shares with which pixels count, and σ where the data have length 1, from a fit."""
+            error = _length(found.light, *data, trust, make) / scale
+            level = _level(error, trust) if noise is None else noise / scale
+            return _SHARES[options.loss](error / level), level
+
+        def again(state, _):
+            share, level = state
+            found, scale = solve_rows(*data, trust * jnp.sqrt(share), level)
+            return judged(found, scale), (found, scale)
 
         ended = optx.fixed_point(
             again,
             optx.FixedPointIteration(0.0, options.tolerance),
-            jnp.ones_like(trust),
+            judged(*solve_rows(*data, trust)),
             has_aux=True,
             max_steps=options.max_steps,
             throw=False,
@@ -183,7 +187,8 @@ def _level(error: Float[Array, " v"], weights: Float[Array, " v"]) -> Float[Arra
 
     start = jnp.full((), -span, error.dtype), jnp.zeros((), error.dtype)
     _, median = jax.lax.fori_loop(0, 32, halve, start)
-    return jnp.maximum(most, jnp.finfo(error.dtype).tiny ** 0.5) * jnp.exp(median) / _MEDIAN
+    # Where the data have length 1, less is rounding.
+    return jnp.maximum(most * jnp.exp(median) / _MEDIAN, jnp.finfo(error.dtype).eps)
 
 
 def _attached(make):

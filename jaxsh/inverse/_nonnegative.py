@@ -8,7 +8,7 @@ the rows are nearly parallel. Newton's steps do not mind.
 import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import solve_triangular
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float
 
 from .._core.linalg import matmul
 
@@ -46,7 +46,7 @@ def _nearest(light, inverse, rows, tolerance: float, max_steps: int):
     matrix, a = matrix / length[:, None], a / length
     most = jnp.max(jnp.abs(a))
     unit = jnp.where(most > 0, most, 1)
-    z, ended, _ = _interior(matrix, a / unit, tolerance, max_steps)
+    z, ended = _interior(matrix, a / unit, tolerance, max_steps)
     met = jnp.min(a) < 0
     moved = light + unit * matmul(root, z)
     return jnp.where(met, moved, light), met, ended | ~met
@@ -54,7 +54,7 @@ def _nearest(light, inverse, rows, tolerance: float, max_steps: int):
 
 def _interior(
     matrix: Float[Array, "n k"], a: Float[Array, " n"], tolerance: float, max_steps: int
-) -> tuple[Float[Array, " k"], Bool[Array, ""], Int[Array, ""]]:
+) -> tuple[Float[Array, " k"], Bool[Array, ""]]:
     """Solves by primal-dual steps (Nocedal & Wright 2006, "Numerical optimization", §16.6)."""
     unknowns = matrix.shape[1]
 
@@ -87,8 +87,8 @@ def _interior(
         return (wrong(state) > tolerance) & (count < max_steps)
 
     start = jnp.zeros(unknowns, a.dtype), jnp.maximum(a, 0.1), jnp.full_like(a, 0.1)
-    state, count = jax.lax.while_loop(open_, step, (start, jnp.zeros((), jnp.int32)))
-    return state[0], wrong(state) <= tolerance, count
+    state, _ = jax.lax.while_loop(open_, step, (start, jnp.zeros((), jnp.int32)))
+    return state[0], wrong(state) <= tolerance
 
 
 def _far(values: Float[Array, " n"], steps: Float[Array, " n"]) -> Float[Array, ""]:

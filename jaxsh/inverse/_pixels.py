@@ -1,12 +1,12 @@
 """Pixels of a picture, or vertices, as the rows that a fit takes."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float
 
-from .._core.checks import as_finite, as_float, check_type, check_vectors, described
+from .._core.checks import as_finite, as_float, check_vectors, described
 from ..transfer import Transfer, unshadowed
 from ._checks import check_data
 
@@ -53,11 +53,7 @@ def as_rows(
         )
     seen = jnp.all(jnp.isfinite(normals), axis=-1) & jnp.any(normals != 0, axis=-1)
     if mask is not None:
-        check_type("mask", mask, Array, np.ndarray)
-        given_mask = jnp.asarray(mask)
-        if given_mask.shape != places or given_mask.dtype != bool:
-            raise ValueError(f"expected mask {places} of booleans, got {described(mask)}")
-        seen = seen & given_mask
+        seen = seen & _as_mask(mask, places)
     normals = normals.reshape(-1, 3)
     transfer = surface if given else unshadowed(jnp.zeros_like(normals), normals, degree)
     if weights is None:
@@ -71,6 +67,17 @@ def as_rows(
         albedo = jnp.where(weights[:, None] > 0, albedo, 0)
     data = check_data(observed.reshape(-1, 3), transfer, albedo, weights)
     return Rows(data[0], transfer, *data[1:])
+
+
+def _as_mask(mask: Any, places: tuple[int, ...]) -> Bool[Array | np.ndarray, "..."]:
+    """Converts to booleans, one of each place; raises `ValueError` for anything else."""
+    try:
+        array = mask if isinstance(mask, Array) else np.asarray(mask)
+    except ValueError:  # lists of several lengths
+        array = np.empty(0)
+    if array.shape != places or array.dtype != bool:
+        raise ValueError(f"expected mask {places} of booleans, got {described(mask)}")
+    return array
 
 
 def of_places(name: str, value: Float[ArrayLike, "..."], places: tuple[int, ...]) -> Array:

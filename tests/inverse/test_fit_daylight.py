@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from jaxsh import inverse, sky, sphere, transfer
+from jaxsh.inverse._pixels import as_rows
 
 ALBEDO = np.array([0.6, 0.5, 0.4])
 SHAPE = 12, 20
@@ -195,6 +196,8 @@ def test_refusals(normals):
     observed = np.ones(normals.shape)
     fit = functools.partial(inverse.fit_daylight, observed, sky=glow)
     point = transfer.unshadowed(normals[0], normals[0], 0)
+    row = [[True, False] * 10]
+    assert as_rows(observed[:1], normals[:1], 0.5, None, row, 0).weights.tolist() == [1, 0] * 10
     for sentence, call in {
         "expected observed (12, 20, 3), got shape (20, 3)": lambda: inverse.fit_daylight(
             observed[0], normals, 0.5
@@ -205,6 +208,12 @@ def test_refusals(normals):
         "expected weights (12, 20), got": lambda: fit(normals, 0.5, weights=np.ones(3)),
         "weights must be finite": lambda: fit(normals, 0.5, weights=-np.ones(SHAPE)),
         "expected sunlit (12, 20), got": lambda: fit(normals, 0.5, sunlit=np.ones(3)),
+        "expected mask (12, 20) of booleans, got a list": lambda: fit(
+            normals, 0.5, mask=[[True], [True, False]]
+        ),
+        "sunlit must be from 0 to 1, got 1.5 to 1.5": lambda: fit(
+            normals, 0.5, sunlit=np.full(SHAPE, 1.5)
+        ),
         "there is no light": lambda: fit(normals, 0.5, mask=np.zeros(SHAPE, bool)),
         "needs a transfer of degree >= 1": lambda: inverse.fit_daylight(
             observed[0], point, 0.5, sky=glow
