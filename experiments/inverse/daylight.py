@@ -135,7 +135,10 @@ def run(config: InverseDaylight, context: Context) -> Table:
                         config.model, np.asarray(found.value.sun), float(found.value.turbidity)
                     )
                     shown.append(Shown(truth, observed, again, found.value, seen))
-    caption = "observed, as rendered from the light that was found, and that light beside the true"
+    caption = (
+        "observed, and as rendered from the light that was found; the true light and the one found, "
+        "circles where the suns are"
+    )
     draw(context.path("recovered.png", caption), view.raster, shown)
     about = {"name": name, "pixels": len(view.free)}
     return Table("Daylight from one picture", rows=_rows(config, context), values=about)

@@ -130,7 +130,8 @@ def run(config: InverseLight, context: Context) -> list[Table]:
                 probe_small = _smaller(probes[probe], 32)
                 pictures.append(Recovered(probe, truth, fits, direct(normals, probe_small)))
     caption = (
-        "front as lit; back as lit, by least squares and with the prior; the lights themselves"
+        "front as lit; back as lit, by least squares and with the prior; the lights themselves, "
+        "blue where they are negative"
     )
     draw(context.path("recovered.png", caption), mesh, pictures, _toward(0, 1, 0), config.height)
     return _tables(context.rows, loaded.about)
