@@ -136,8 +136,8 @@ def run(config: InverseDaylight, context: Context) -> Table:
                     )
                     shown.append(Shown(truth, observed, again, found.value, seen))
     caption = (
-        "observed, and as rendered from the light that was found; the true light and the one found, "
-        "circles where the suns are"
+        "observed, and as rendered from the light that was found; the true light and the one "
+        "found, with circles where the suns are"
     )
     draw(context.path("recovered.png", caption), view.raster, shown)
     about = {"name": name, "pixels": len(view.free)}
