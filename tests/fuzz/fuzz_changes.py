@@ -12,8 +12,8 @@ import zipfile
 import zlib
 from random import Random
 
+from fuzz_archives import archive, compressed_archive
 from fuzz_bytes import OF_BYTES, OF_TEXT, put_number, swap_number
-from fuzz_files import archive, compressed_archive
 
 JSON_VALUES = [
     None, True, False, -1, 0, 1, 2, 3, 4, 5, 12, 36, 255, 5120, 5121, 5122, 5123, 5124, 5125, 5126,

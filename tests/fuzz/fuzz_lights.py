@@ -4,6 +4,7 @@ import json
 import struct
 
 import numpy as np
+from fuzz_archives import archive
 from fuzz_pictures import npy
 
 _EXTENSION = "EXT_lights_image_based"
@@ -85,8 +86,6 @@ def _npy() -> list[bytes]:
 
 
 def _npz() -> list[bytes]:
-    from fuzz_files import archive
-
     facts = json.dumps({"axes": ["+x", "+z", "-y"], "layout": "channels-last"})
     ours = {"format": np.array("jaxsh light"), "version": np.array(1), "facts": np.array(facts)}
     ours["coefficients"] = y_up()

@@ -6,7 +6,8 @@ import zlib
 
 import numpy as np
 import pytest
-from fuzz_files import compressed_archive, put_beside, seeds
+from fuzz_archives import compressed_archive
+from fuzz_files import put_beside, seeds
 from fuzz_peers import summary
 from fuzz_readers import check, without_compiling
 
