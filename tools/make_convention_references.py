@@ -218,8 +218,7 @@ def of_node(folder: Path):
         said[package] = f"{package} {facts['version']}"
 
     def made(name, package, function, values, **more):
-        both = {"coefficients": given.tolist(), "directions": at.tolist(), "values": values}
-        return name, {"package": said[package], "function": function, **both, **more}
+        return name, entry(said[package], function, given, at, values, **more)
 
     yield made("three.js", "three", "SphericalHarmonics3.getAt", found["radiance"])
     yield made(

@@ -11,11 +11,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
-from ..harmonics import degrees
 from ..sphere import fibonacci
 from ._given import Reading
 from ._known import same_layout
 from ._placements import values
+from ._search import sizes
 from ._space import Combination, Space, space
 from ._verdict import Verdict
 
@@ -96,8 +96,7 @@ def _no_third(readings: list[Reading]) -> str:
         degree = math.isqrt(reading.channels.shape[1]) - 1
         if degree < 4:
             continue
-        l = degrees(degree)
-        size = np.sqrt(np.bincount(l, weights=np.sum(reading.channels**2, axis=0)))
+        size = sizes(reading.channels)
         if size[3] <= _NOTHING * size[2] and size[4] > _NOTHING * size[2]:
             return "degree 3 is zero and degree 4 is not: irradiance, as no light's own are so"
     return ""

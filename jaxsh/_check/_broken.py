@@ -4,13 +4,11 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
-from ..harmonics import degrees
 from ._decide import Case, Choice, Decision, near_one
 from ._known import around, convention_of, conversion, judge, residuals, same_layout
 from ._matching import Match, constants, described, match
-from ._search import numbers
+from ._search import numbers, sizes
 from ._space import Space, space
 from ._turn import look_for_turn
 from ._verdict import Verdict
@@ -189,8 +187,8 @@ def _powers(found: list[Case]) -> str:
     for case in found:
         if case.light.said or case.reading.said:
             continue
-        light = _by_degree(case.light.coefficients)
-        given = _by_degree(case.reading.channels)[: len(light)]
+        light = sizes(case.light.coefficients)
+        given = sizes(case.reading.channels)[: len(light)]
         if len(given) < 3 or light.min() <= 0:
             continue
         ratio = given / light
@@ -202,8 +200,3 @@ def _powers(found: list[Case]) -> str:
         said = ", ".join(factor(float(one)) for one in ratio / ratio[0])
         return f"relative to the light its degrees have the sizes {said}"
     return ""
-
-
-def _by_degree(channels: Float[np.ndarray, "c k"]) -> Float[np.ndarray, " bands"]:
-    l = degrees(math.isqrt(channels.shape[1]) - 1)
-    return np.sqrt(np.bincount(l, weights=np.sum(channels**2, axis=0)))

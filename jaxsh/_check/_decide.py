@@ -82,6 +82,9 @@ def decide(
         limit = threshold(count, space.maps * len(found) * tried)
     if free_scale:
         limit = min(limit, _MOST_OF_A_DIRECTION)
+    if best.error > limit:  # none of them fits
+        plain = _plainest(best.case, int(space.map[best.at]), space, free_scale)
+        return Decision(plain, (), False, limit)
     errors = np.stack([case.fits.error for case in found])
     # Errors that differ from channel to channel tell more than those that all channels share.
     given, wanted = beside(best, space)
@@ -93,9 +96,6 @@ def decide(
     near &= np.isfinite(errors)
     groups: dict[tuple[str, str, int], Choice] = {}
     places = np.argwhere(near)
-    if best.error > limit:  # none of them fits
-        plain = _plainest(best.case, int(space.map[best.at]), space, free_scale)
-        return Decision(plain, (), False, limit)
     for place in places[np.argsort(scores[near])]:
         case, at = found[place[0]], Combination(*map(int, place[1:]))
         key = (case.reading.layout, case.reading.said, int(space.map[at]))

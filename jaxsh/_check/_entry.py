@@ -13,7 +13,7 @@ from ._alone import check_alone
 from ._basis import check_basis
 from ._broken import explain, windowed
 from ._decide import cases, decide
-from ._given import MOST, Reading, mistaken, of_direction, of_picture, read, tinted
+from ._given import MOST, Light, Reading, mistaken, of_direction, of_picture, read, tinted
 from ._known import furnace, judge
 from ._search import FLOOR
 from ._space import space
@@ -22,6 +22,9 @@ from ._words import percent
 
 # A picture with a larger part of its values at the maximum has been cut off there.
 _CLIPPED = 1e-3
+
+# Of a degree and a number of channels.
+_Lights = Callable[[int, int], list[Light]]
 
 
 def check(
@@ -142,7 +145,13 @@ def _from_picture(readings: list[Reading], picture: np.ndarray) -> Verdict:
 
 
 def _verdict(
-    readings, lights, mistakes, *, strength: bool, most: int = MOST, channels: int = 1
+    readings: list[Reading],
+    lights: _Lights,
+    mistakes: _Lights | None,
+    *,
+    strength: bool,
+    most: int = MOST,
+    channels: int = 1,
 ) -> Verdict:
     groups: dict[int, list[Reading]] = {}
     for reading in readings:

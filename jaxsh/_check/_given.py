@@ -1,6 +1,7 @@
 """Reads what was given: how an array may hold coefficients, and the lights they may be of."""
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -57,7 +58,7 @@ def read(given) -> list[Reading]:
     return readings
 
 
-def _readings(array: np.ndarray):
+def _readings(array: np.ndarray) -> Iterator[Reading]:
     shape: list[int] = list(array.shape)
     size = array.size
     if len(shape) == 1 and _square(size):

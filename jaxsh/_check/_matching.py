@@ -1,5 +1,6 @@
 """Single coefficients or functions that break a convention, and what is wrong with each."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -173,6 +174,7 @@ def _parts(function, basis) -> str:
     if np.linalg.norm(function) < 1e-9:
         return "zero"
     large = np.flatnonzero(np.abs(weights) > 0.02 * np.abs(weights).max())
-    l, m = degrees(20), orders(20)
+    degree = math.isqrt(len(weights)) - 1
+    l, m = degrees(degree), orders(degree)
     terms = [f"{weights[i]:.3g} of ({_name(int(i), l, m)})" for i in large[:4]]
     return "a sum: " + " + ".join(terms) + (" + …" if len(large) > 4 else "")

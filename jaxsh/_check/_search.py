@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from ..harmonics import degrees
 from ._space import Space
 
 # Relative errors below this are of projections (weights of pixels, resampling), not of conventions.
@@ -68,6 +69,12 @@ def numbers(given: Float[np.ndarray, "c k"]) -> float:
     total = np.sum(gram**2)
     ratio = np.trace(gram) ** 2 / total if total > 0 else 1.0
     return float(ratio * given.shape[1])
+
+
+def sizes(channels: Float[np.ndarray, "c k"]) -> Float[np.ndarray, " bands"]:
+    """Measure each degree of all channels together, which no turn changes."""
+    l = degrees(math.isqrt(channels.shape[1]) - 1)
+    return np.sqrt(np.bincount(l, weights=np.sum(channels**2, axis=0)))
 
 
 def threshold(count: float, maps: int) -> float:

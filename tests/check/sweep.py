@@ -13,6 +13,8 @@ import samples
 
 import jaxsh
 from jaxsh import harmonics
+from jaxsh._check._search import threshold
+from jaxsh._check._space import space
 
 SIGNS = ("+", "-")
 
@@ -112,6 +114,9 @@ CASES += [
 
 if __name__ == "__main__":
     warnings.simplefilter("error")
+    for degree in (1, 2):
+        limit = threshold((degree + 1) ** 2, space(degree, degree).maps)
+        print(f"a gray light of degree {degree} is met by chance to {100 * limit:.1f} %")
     count, tables = int(sys.argv[1]), collections.defaultdict(collections.Counter)
     for seed, case in enumerate(CASES):
         known = "direction" if case.get("direction") else "picture"

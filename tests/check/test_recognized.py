@@ -116,7 +116,7 @@ def test_layouts(image, light):
     ):
         verdict = jaxsh.check(given, image)
         assert verdict.decided
-        assert verdict.summary.endswith(words) or words in verdict.summary
+        assert words in verdict.summary
         assert not verdict.faults
     verdict = jaxsh.check(light.T.reshape(3, 9), image)
     assert verdict.faults == (
