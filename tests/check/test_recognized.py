@@ -28,7 +28,7 @@ def test_each_convention_is_recognized_from_the_picture(name, image, light):
     assert verdict.residual < 0.02  # the sine of 16 rows beside Fejér's weights
     assert not verdict.faults
     back = harmonics.convert(given, verdict.found, "jaxsh")
-    np.testing.assert_allclose(back, light, rtol=0, atol=1e-12 * np.abs(light).max())
+    np.testing.assert_allclose(back, light, rtol=0, atol=1e-15 * np.abs(light).max())
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -64,7 +64,7 @@ def test_conventions_that_no_name_has(image, light):
     assert "y up" in verdict.summary
     assert "irradiance" in verdict.summary
     back = harmonics.convert(harmonics.convert(light, "jaxsh", turned), verdict.found, "jaxsh")
-    np.testing.assert_allclose(back, light, rtol=0, atol=1e-12 * np.abs(light).max())
+    np.testing.assert_allclose(back, light, rtol=0, atol=1e-15 * np.abs(light).max())
 
 
 @pytest.mark.parametrize(
