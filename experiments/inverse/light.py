@@ -16,6 +16,7 @@ from jaxtyping import Float, Int
 from jaxsh import geometry, imaging, inverse, sphere, transfer
 
 from ..runner import Context, Table, experiment
+from ..shared.pixels import direct_irradiance, solid_angles
 from ..shared.subjects import double, load
 from .light_picture import Recovered, draw
 from .prior import band_powers, power_law
@@ -86,7 +87,7 @@ def run(config: InverseLight, context: Context) -> list[Table]:
     lit = []
     with context.time(f"{name}: all pixels of the probes"):
         small = {name: _smaller(probe, config.rows) for name, probe in probes.items()}
-        exact = {name: direct(normals[used], probe) for name, probe in small.items()}
+        exact = {name: _direct(normals[used], probe) for name, probe in small.items()}
         lit.append(Lit("normals", used, exact))
     with context.time(f"{name}: rays to the probes"):
         small = {name: _smaller(probe, config.shadow_rows) for name, probe in probes.items()}
@@ -128,7 +129,7 @@ def run(config: InverseLight, context: Context) -> list[Table]:
             first = config.degrees[0], config.views[0], config.noise[-1], 0
             if scene.surface == "normals" and (degree, views, noise, turn) == first:
                 probe_small = _smaller(probes[probe], 32)
-                pictures.append(Recovered(probe, truth, fits, direct(normals, probe_small)))
+                pictures.append(Recovered(probe, truth, fits, _direct(normals, probe_small)))
     caption = (
         "front as lit; back as lit, by least squares and with the prior; the lights themselves, "
         "blue where they are negative"
@@ -169,7 +170,7 @@ def _smaller(probe: Float[np.ndarray, "h w 3"], rows: int) -> Float[np.ndarray, 
     step = height // rows
     if height % rows or width % step:
         raise ValueError(f"{rows} rows do not divide a probe of {height}")
-    weights = _solid_angles(height, width)
+    weights = np.broadcast_to(solid_angles(height, width), (height, width))
     weighted = (probe * weights[..., None]).reshape(rows, step, width // step, step, 3)
     return (
         weighted.sum((1, 3))
@@ -177,20 +178,10 @@ def _smaller(probe: Float[np.ndarray, "h w 3"], rows: int) -> Float[np.ndarray, 
     )
 
 
-def _solid_angles(height: int, width: int) -> Float[np.ndarray, "h w"]:
-    bands = -np.diff(np.cos(np.arange(height + 1) * np.pi / height)) * 2 * np.pi / width
-    return np.broadcast_to(bands[:, None], (height, width))
-
-
-def direct(
+def _direct(
     normals: Float[np.ndarray, "n 3"], probe: Float[np.ndarray, "h w 3"]
 ) -> Float[np.ndarray, "n 3"]:
-    """∫ L(ω) max(0, n·ω) dω over all pixels."""
-    height, width, _ = probe.shape
-    directions = np.asarray(sphere.lat_long(height, width).directions, float)
-    weighted = (probe * _solid_angles(height, width)[..., None]).reshape(-1, 3)
-    blocks = np.array_split(normals, max(1, len(normals) // 100))
-    return np.concatenate([np.maximum(block @ directions.T, 0) @ weighted for block in blocks])
+    return np.asarray(direct_irradiance(jnp.asarray(normals), jnp.asarray(probe)))
 
 
 def _shadowed(
@@ -199,7 +190,7 @@ def _shadowed(
     """The same with what the mesh itself hides taken away, by a ray to each pixel."""
     height, width, _ = next(iter(probes.values())).shape
     directions = np.asarray(sphere.lat_long(height, width).directions, float)
-    solid = _solid_angles(height, width).ravel()
+    solid = np.broadcast_to(solid_angles(height, width), (height, width)).ravel()
     scene, size = geometry.ray_scene(mesh), float(np.ptp(np.asarray(mesh.vertices), axis=0).max())
     found = {name: np.zeros((len(vertices), 3)) for name in probes}
     for row, vertex in enumerate(vertices):

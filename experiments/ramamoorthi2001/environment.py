@@ -20,6 +20,7 @@ from matplotlib.colors import Normalize
 from jaxsh import harmonics, imaging, sphere
 
 from ..runner import Context, Table, experiment
+from ..shared.pixels import direct_irradiance
 from ..shared.plots import View, plt, save
 
 ALBEDO = 0.5
@@ -104,24 +105,6 @@ def run(config: Environment, context: Context) -> list[Table]:
     path = context.path("environments.png", "the reference under each environment")
     _draw_sheet(path, sheet, view)
     return list(_tables(context.rows))
-
-
-@jax.jit
-def direct_irradiance(
-    normals: Float[Array, "v 3"], environment: Float[Array, "h w 3"]
-) -> Float[Array, "v 3"]:
-    """∫ L(ω) max(0, n·ω) dω over all pixels, with their exact solid angles as weights."""
-    height, width, _ = environment.shape
-    edges = np.cos(np.arange(height + 1) * np.pi / height)
-    solid_angles = jnp.asarray((edges[:-1] - edges[1:]) * 2 * np.pi / width, environment.dtype)
-    weighted = (environment * solid_angles[:, None, None]).reshape(-1, 3)
-    directions = sphere.lat_long(height, width).directions.astype(environment.dtype)
-
-    def one(normal):
-        cosine = jnp.maximum(jnp.matmul(directions, normal, precision="highest"), 0)
-        return jnp.matmul(cosine, weighted, precision="highest")
-
-    return jax.lax.map(one, normals, batch_size=64)  # 32 MB of cosines at a time
 
 
 def _windowed(

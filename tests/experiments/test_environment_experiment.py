@@ -8,7 +8,7 @@ import pytest
 from pictures import assert_picture
 from runs import run
 
-from experiments.ramamoorthi2001.environment import direct_irradiance
+from experiments.shared.pixels import direct_irradiance
 from jaxsh import sphere
 
 
