@@ -4,11 +4,12 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
 from jaxsh import geometry, imaging, sphere, transfer
 
 from ..runner import Context, UserError
+from ..shared.receivers import Receivers, seen_cosines
 from ..shared.subjects import load
 from .ringing_lights import Need, Probe
 
@@ -21,7 +22,7 @@ _SHOWN = {
     (True, "none"): _SPLIT,
 }
 _ROWS = 128  # of the picture that is summed over
-_CELLS = 1 << 21  # vertices × directions at a time
+_OFFSET = 1e-3  # of rays, in half-extents
 
 
 class Shaded(NamedTuple):
@@ -60,7 +61,7 @@ def shade(
     rng, count = np.random.default_rng(context.seed), len(mesh.vertices)
     chosen = np.sort(rng.choice(count, min(vertices, count), replace=False))
     with context.time(f"{name}: reference"):
-        seen = _seen(mesh, chosen, _pixels(probes[0].image)[1], eye, (needs[0], glossy))
+        seen = _seen(context, mesh, chosen, _pixels(probes[0].image)[1], eye, (needs[0], glossy))
     makers = _makers(subject.baked, mesh, degree, eye, glossy)
     rows: list[dict[str, Any]] = []
     colors: dict[str, list[np.ndarray]] = {}
@@ -131,52 +132,22 @@ def _pixels(
 
 
 def _seen(
+    context: Context,
     mesh: geometry.Mesh,
     chosen: Int[np.ndarray, " v"],
     directions: Float[np.ndarray, "n 3"],
     eye: Float[np.ndarray, " 3"],
     needs: tuple[Need, Need],
 ) -> list[Seen]:
-    points, normals = np.asarray(mesh.vertices)[chosen], np.asarray(mesh.normals)[chosen]
-    cosines = np.maximum(normals @ directions.T, 0)
-    free = _free(mesh, chosen, np.broadcast_to(directions, (len(chosen), *directions.shape)))
-    lobes = _lobe(points, normals, eye, needs[1].exponent or 0.0)
-    found = []
-    for need, over in zip(needs, (cosines, cosines * lobes(directions)), strict=True):
-        found.append(Seen(need, over, over * free))
-    return found
-
-
-def _lobe(points, normals, eye, exponent):
-    """The normalized lobe about the mirrored direction to the eye, (k+1)/2π cosᵏ."""
-    to_eye = eye - points
-    to_eye = to_eye / np.linalg.norm(to_eye, axis=-1, keepdims=True)
-    mirrored = 2 * (normals * to_eye).sum(axis=-1, keepdims=True) * normals - to_eye
-
-    def values(directions):
-        cosines = np.maximum(mirrored @ directions.T, 0)
-        return (exponent + 1) / (2 * np.pi) * cosines**exponent
-
-    return values
-
-
-def _free(
-    mesh: geometry.Mesh, chosen: Int[np.ndarray, " v"], directions: Float[np.ndarray, "v n 3"]
-) -> Bool[np.ndarray, "v n"]:
-    """Which directions above the surface nothing is in the way of."""
-    scene = geometry.ray_scene(mesh)
-    vertices, normals = np.asarray(mesh.vertices), np.asarray(mesh.normals)
-    lift = 1e-3 * np.ptp(vertices, axis=0).max() / 2
-    origins = vertices[chosen] + lift * normals[chosen]
-    free = np.zeros(directions.shape[:2], bool)
-    at_once = max(1, _CELLS // directions.shape[1])
-    for start in range(0, len(chosen), at_once):
-        part = slice(start, start + at_once)
-        above = np.einsum("vnx,vx->vn", directions[part], normals[chosen][part]) > 0
-        row, column = np.nonzero(above)
-        blocked = scene.occluded(origins[part][row], directions[part][row, column])
-        free[part][row, column] = ~blocked
-    return free
+    mirrored = np.asarray(
+        transfer.reflected_direction(eye, mesh.vertices[chosen], mesh.normals[chosen])
+    )
+    exponent = needs[1].exponent or 0.0
+    lobes = np.maximum(mirrored @ directions.T, 0) ** exponent * (exponent + 1) / (2 * np.pi)
+    receivers, scene = Receivers.of(mesh, chosen, _OFFSET), geometry.ray_scene(mesh)
+    some = [pair for _, *pair in seen_cosines(scene, receivers, directions, context)]
+    cosines, free = (np.concatenate(each) for each in zip(*some, strict=True))
+    return [Seen(needs[0], cosines, free), Seen(needs[1], cosines * lobes, free * lobes)]
 
 
 def _with_suns(mesh, suns, eye, glossy, colors):

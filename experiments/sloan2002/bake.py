@@ -16,7 +16,8 @@ from jaxtyping import Int
 from jaxsh import geometry, harmonics, transfer
 
 from ..runner import Context
-from .reference import VARIANTS, Estimate, Receivers, direct, turned
+from ..shared.receivers import Receivers
+from .reference import VARIANTS, Estimate, direct, turned
 
 OFFSET = 1e-4  # of rays, in half-extents
 

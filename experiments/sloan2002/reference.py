@@ -5,7 +5,6 @@ light, random paths for what bounces. Both are unbiased for a probe of constant 
 as two independent halves whose difference tells their own error.
 """
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,10 +13,9 @@ from jaxtyping import Float, Int
 from jaxsh import geometry, sphere
 
 from ..runner import Context
+from ..shared.receivers import Receivers, parts, seen_cosines
 
 VARIANTS: tuple[str, ...] = ("unshadowed", "shadowed", "one bounce")
-
-_CELLS = 1 << 21  # vertices × directions at a time: some 100 MB of rays
 
 
 class Estimate(NamedTuple):
@@ -30,19 +28,6 @@ class Estimate(NamedTuple):
     def of(cls, one: np.ndarray, other: np.ndarray) -> "Estimate":
         mean = (one + other) / 2
         return cls(mean, float(np.linalg.norm(one - other) / 2 / np.linalg.norm(mean)))
-
-
-class Receivers(NamedTuple):
-    """Vertices that light may reach."""
-
-    origins: Float[np.ndarray, "v 3"]  # of rays, off the surface as the bake's are
-    normals: Float[np.ndarray, "v 3"]
-
-    @classmethod
-    def of(cls, mesh: geometry.Mesh, chosen: Int[np.ndarray, " v"], ray_bias: float) -> "Receivers":
-        vertices, normals = np.asarray(mesh.vertices), np.asarray(mesh.normals)
-        lift = ray_bias * np.ptp(vertices, axis=0).max() / 2
-        return cls(vertices[chosen] + lift * normals[chosen], normals[chosen])
 
 
 class Pixels(NamedTuple):
@@ -134,24 +119,6 @@ def direct(
     return unshadowed, shadowed
 
 
-def seen_cosines(
-    scene: geometry.RayScene,
-    receivers: Receivers,
-    directions: Float[np.ndarray, "n 3"],
-    context: Context,
-) -> Iterator[tuple[slice, Float[np.ndarray, "part n"], Float[np.ndarray, "part n"]]]:
-    """max(0, n·ω) of some vertices at a time, and the same, zero where something is in the way."""
-    for part in context.progress(_parts(len(receivers.normals), len(directions)), "quadrature"):
-        cosines = np.maximum(receivers.normals[part] @ directions.T, 0)
-        vertex, direction = np.nonzero(cosines)
-        blocked = scene.occluded(
-            np.take(receivers.origins[part], vertex, axis=0), np.take(directions, direction, axis=0)
-        )
-        seen = cosines.copy()
-        seen[vertex[blocked], direction[blocked]] = 0
-        yield part, cosines, seen
-
-
 def one_bounce(
     mesh: geometry.Mesh,
     scene: geometry.RayScene,
@@ -173,7 +140,7 @@ def one_bounce(
     cumulative = [np.cumsum(probe.sum(axis=1), dtype=np.float64) for probe in probes]
     lift = ray_bias * np.ptp(np.asarray(mesh.vertices), axis=0).max() / 2
     total = np.zeros((len(receivers.normals), pixels.flux.shape[1]))
-    for part in context.progress(_parts(len(total), 16 * paths), "paths"):
+    for part in context.progress(parts(len(total), 16 * paths), "paths"):
         normals = receivers.normals[part]
         towards = _cosine_distributed(normals, paths, rng)
         vertex = np.repeat(np.arange(len(normals)), paths)
@@ -229,9 +196,3 @@ def _cosine_distributed(
     frame = (side[:, None], up[:, None], normals[:, None])
     mixed = sum(a[..., None] * axis for a, axis in zip((x, y, z), frame, strict=True))
     return np.asarray(mixed, np.float32).reshape(-1, 3)
-
-
-def _parts(vertices: int, directions: int) -> list[slice]:
-    """Slices of the vertices with few enough rays to hold."""
-    size = max(1, _CELLS // directions)
-    return [slice(start, min(start + size, vertices)) for start in range(0, vertices, size)]

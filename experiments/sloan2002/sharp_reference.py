@@ -11,8 +11,9 @@ from jaxtyping import Bool, Float
 from jaxsh import geometry, harmonics, imaging, sphere, transfer
 
 from ..runner import Context
+from ..shared.receivers import Receivers, seen_cosines
 from .bake import OFFSET
-from .reference import Estimate, Pixels, Receivers, seen_cosines
+from .reference import Estimate, Pixels
 
 VARIANTS = "unshadowed", "shadowed"
 BY_COEFFICIENTS = -1.0  # in the place of an exponent

@@ -9,7 +9,8 @@ from pictures import assert_picture
 from runs import run
 
 from experiments.runner import Context, Data
-from experiments.sloan2002.reference import Pixels, Receivers, direct, one_bounce, turned
+from experiments.shared.receivers import Receivers
+from experiments.sloan2002.reference import Pixels, direct, one_bounce, turned
 from experiments.sloan2002.still import draw_still
 from jaxsh.geometry import make_mesh, ray_scene
 
