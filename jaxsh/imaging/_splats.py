@@ -100,7 +100,7 @@ def read_splats(path: str | os.PathLike[str], *, up: Literal["z", "y", "-y"] = "
 
     Takes x y z, f_dc_0 to 2, f_rest_… (all of red first, 0, 9, 24, 45 or 72 of them), opacity,
     scale_… and rot_0 to 3. Normals of zero are left out; other properties are too, with a
-    `UserWarning` that names them. A million splats of degree 3 take seconds.
+    `UserWarning` that names them. A million splats of degree 3 take about a second.
 
     **Arguments**
 
