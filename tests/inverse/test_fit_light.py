@@ -95,7 +95,9 @@ def test_posterior(seen):
     np.testing.assert_allclose(block, spread[1, :9, :9], rtol=0, atol=1e-5)
     assert not np.any(found.confidence.covariance[9:18, :9])
     variances = PRIOR[np.asarray(harmonics.degrees(2))[1:] - 1] * expected[:, :1] ** 2
-    np.testing.assert_allclose(found.determined[:, 1:], 1 - deviation[:, 1:] ** 2 / variances, 1e-3)
+    np.testing.assert_allclose(
+        found.determined[:, 1:], 1 - deviation[:, 1:] ** 2 / variances, rtol=1e-3
+    )
     assert np.all(found.determined[:, 0] == 1)
     error = np.abs(found.value - light[:, :9]) / deviation
     assert np.sqrt(np.mean(np.square(error))) == pytest.approx(1, abs=0.4)
