@@ -26,7 +26,7 @@ def make_page(path: Path) -> Path:
     afternoon = np.array([0.6, -0.6, 0.53]) / np.linalg.norm([0.6, -0.6, 0.53])
     clear = sky.preetham_harmonics(afternoon, 3.0, DEGREE)
     lights = {
-        "studio, softened against ringing": studio * harmonics.window("hann", DEGREE),
+        "studio, softened": studio * harmonics.window("hann", DEGREE),
         "studio as it is": studio,
         "clear sky, without the sun's disc": clear * (studio[0, 0] / clear[0, 0]),
     }
