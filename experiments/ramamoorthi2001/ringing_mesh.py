@@ -9,6 +9,7 @@ from jaxtyping import Array, Float, Int
 from jaxsh import geometry, imaging, sphere, transfer
 
 from ..runner import Context, UserError
+from ..shared.pixels import solid_angles
 from ..shared.receivers import Receivers, seen_cosines
 from ..shared.subjects import load
 from .ringing_lights import Need, Probe
@@ -122,8 +123,7 @@ def _pixels(
     """Radiance times solid angle of blocks of pixels, and their directions."""
     radiance = np.asarray(image, np.float64)
     height, width, _ = radiance.shape
-    edges = np.cos(np.arange(height + 1) * np.pi / height)
-    flux = radiance * ((edges[:-1] - edges[1:]) * 2 * np.pi / width)[:, None, None]
+    flux = radiance * solid_angles(height, width)[..., None]
     block = max(1, height // _ROWS)
     rows, columns = height // block, width // block
     flux = flux[: rows * block, : columns * block]

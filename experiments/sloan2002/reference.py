@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 from jaxsh import geometry, sphere
 
 from ..runner import Context
+from ..shared.pixels import solid_angles
 from ..shared.receivers import Receivers, parts, seen_cosines
 
 VARIANTS: tuple[str, ...] = ("unshadowed", "shadowed", "one bounce")
@@ -40,10 +41,9 @@ class Pixels(NamedTuple):
     @classmethod
     def of(cls, probes: list[Float[np.ndarray, "h w 3"]]) -> "Pixels":
         height, width, _ = probes[0].shape
-        edges = np.cos(np.arange(height + 1) * np.pi / height)
-        solid_angles = np.repeat((edges[:-1] - edges[1:]) * 2 * np.pi / width, width)
+        weights = np.repeat(solid_angles(height, width), width)
         radiance = np.concatenate([probe.reshape(-1, 3) for probe in probes], axis=1)
-        return cls((height, width), (radiance * solid_angles[:, None]).astype("f4"), solid_angles)
+        return cls((height, width), (radiance * weights[:, None]).astype("f4"), weights)
 
     def directions(
         self, pixels: Int[np.ndarray, " n"], rng: np.random.Generator

@@ -85,9 +85,9 @@ def sun_visibility(
     the source is below its horizon. Of a disc each point takes the same spiral of equal areas,
     turned about the disc's middle by an angle of its own; of a source with a `shape`, one of each
     group of neighboring vectors. So what is left of the error in a half shadow is noise from point
-    to point, where rays that all points share would give bands: 4 % of a disc (RMS, 16 rays past a
-    straight edge, `tests/transfer/test_sun_visibility.py`). Points at one position take the same
-    rays, and a seam does not show.
+    to point, where rays that all points share would give bands: 4 % of a disc and 6 % of a `shape`
+    (RMS, 16 rays past a straight edge, `tests/transfer/test_sun_visibility.py`). Points at one
+    position take the same rays, and a seam does not show.
 
     **Arguments**
 
