@@ -22,6 +22,7 @@ class Verdict:
     - `faults`: what is wrong by that convention, in words.
     - `open`: what cannot be told, and what would decide it.
     - `notes`: what else was seen.
+    - `conversion`: the call that converts to our convention; empty where there is none.
 
     **Example**
 

@@ -65,7 +65,8 @@ def test_a_pole_is_one_value_from_all_sides(rng):
         np.testing.assert_allclose(
             look_up(environment, jnp.asarray(around)), mean, rtol=0, atol=1e-8
         )
-    np.testing.assert_allclose(look_up(environment, jnp.zeros(3)), environment[0].mean(axis=0))
+    found, mean = look_up(environment, jnp.zeros(3)), environment[0].mean(axis=0)
+    np.testing.assert_allclose(found, mean, rtol=1e-15)
 
 
 def test_constant_and_bounded(rng):
@@ -126,7 +127,7 @@ def test_a_mesh_stands_before_its_environment(rng):
     alpha = np.asarray(raster.alpha)[..., None]
     np.testing.assert_allclose(image, alpha + (1 - alpha) * behind, rtol=0, atol=1e-6)
     slope = jax.jit(jax.grad(lambda e: interpolate(raster, white, backdrop(e, camera)).sum()))
-    np.testing.assert_allclose(slope(environment).sum(), 3 * (1 - alpha).sum(), rtol=1e-4)
+    np.testing.assert_allclose(slope(environment).sum(), 3 * (1 - alpha).sum(), rtol=1e-6)
     # In float32 throughout: a camera's, a mesh's and an environment's usual dtype.
     assert image.dtype == behind.dtype == jnp.float32
 

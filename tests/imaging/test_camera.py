@@ -109,7 +109,7 @@ def test_facing_fills_the_picture(width, height, toward):
     assert np.abs(free[0] - free[1]).max() <= 2
     view = np.asarray(camera.position - camera.target)
     np.testing.assert_allclose(
-        view / np.linalg.norm(view), toward / np.linalg.norm(toward), rtol=0, atol=1e-5
+        view / np.linalg.norm(view), toward / np.linalg.norm(toward), rtol=0, atol=2e-7
     )
 
 
@@ -249,7 +249,7 @@ def test_samples_are_averaged_in_linear_light(sheet):
         for raster in (rasterize(sheet, camera, samples=3), rasterize(sheet, finer))
     )
     np.testing.assert_allclose(
-        image, fine.reshape(6, 3, 8, 3, 3).mean(axis=(1, 3)), rtol=0, atol=1e-6
+        image, fine.reshape(6, 3, 8, 3, 3).mean(axis=(1, 3)), rtol=0, atol=1e-15
     )
 
 

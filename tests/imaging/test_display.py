@@ -156,12 +156,12 @@ def test_psnr_of_known_errors(dtype):
     reference = jnp.full((4, 6, 3), 0.5, dtype)
     assert psnr(reference, reference).dtype == dtype
     assert psnr(reference, reference) == jnp.inf
-    np.testing.assert_allclose(psnr(reference + 0.1, reference), 20, rtol=1e-5)
-    np.testing.assert_allclose(psnr(reference + 0.1, reference, peak=10.0), 40, rtol=1e-5)
+    np.testing.assert_allclose(psnr(reference + 0.1, reference), 20, rtol=1e-6)
+    np.testing.assert_allclose(psnr(reference + 0.1, reference, peak=10.0), 40, rtol=1e-6)
     # One channel of one pixel in eight: a twenty-fourth of the square.
     spot = reference.at[1, 1, 0].add(0.1)
     mask = jnp.zeros((4, 6), bool).at[1, :].set(True).at[2, :2].set(True)
-    np.testing.assert_allclose(psnr(spot, reference, mask), 20 + 10 * np.log10(24), rtol=1e-5)
+    np.testing.assert_allclose(psnr(spot, reference, mask), 20 + 10 * np.log10(24), rtol=1e-6)
     assert psnr(spot, reference, ~mask) == jnp.inf
     assert jnp.isnan(psnr(spot, reference, mask & False))
 

@@ -77,7 +77,7 @@ def test_energy_is_kept(tmp_path, rng, layout):
     """Of a picture that no look-up likes: noise from pixel to pixel, a thousandfold in range."""
     n = 128
     weights = solid_angles(layout, n)
-    np.testing.assert_allclose(weights.sum(), 4 * np.pi, rtol=1e-4)
+    np.testing.assert_allclose(weights.sum(), 4 * np.pi, rtol=1e-9)
     picture = np.exp(rng.normal(size=(*weights.shape, 3)) * 1.5)
     expected = np.einsum("hw,hwc->c", weights, picture)
     image = read_environment(save(tmp_path / "noise.npy", picture), layout=layout)
