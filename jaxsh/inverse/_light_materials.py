@@ -4,12 +4,11 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import optimistix as optx
 from jaxtyping import Array, Float, Int
 
 from .._core.linalg import einsum, matmul
 from ._light_solve import Solution, compress_rows
-from ._solve import covariance, triangle
+from ._solve import covariance, fixed_point, triangle
 
 # No color becomes darker than this part of the mean: its logarithm is what is iterated.
 _DARKEST = 1e-4
@@ -59,7 +58,7 @@ def solve_colored(
         """Rows of each channel, all materials one below the other."""
         return einsum("mc,mrk->cmrk", colors, operators).reshape(3, -1, width)
 
-    def again(logs, _):
+    def again(logs):
         colors = scaled(jnp.exp(logs))
         b = jnp.moveaxis(targets, 1, 0).reshape(3, -1, 1)
         small = jax.vmap(triangle)(jnp.concatenate([lit(colors), b], axis=-1))
@@ -70,14 +69,8 @@ def solve_colored(
         fresh = jnp.maximum(scaled(jnp.where(own > 0, fresh, mean[None])), _DARKEST * mean[None])
         return jnp.log(scaled(fresh)), (found, colors)
 
-    ended = optx.fixed_point(
-        again,
-        optx.FixedPointIteration(0.0, tolerance),
-        jnp.log(jnp.broadcast_to(mean[None], (count, 3))),
-        has_aux=True,
-        max_steps=max_steps,
-        throw=False,
-    )
+    start = jnp.log(jnp.broadcast_to(mean[None], (count, 3)))
+    ended = fixed_point(again, start, tolerance=tolerance, max_steps=max_steps)
     found, colors = ended.aux
     found = found._replace(inverse=_inverse(found, colors, share, lit(colors), count))
     return Colored(found, scale, colors, ended.result, ended.stats["num_steps"])

@@ -28,6 +28,7 @@ from ._light_result import RecoveredLight
 from ._light_solve import Solution, compress_rows, solve_plain, solve_with_prior, width_of
 from ._nonnegative import nonnegative
 from ._result import Confidence, Statistics
+from ._solve import fixed_point
 
 Loss = Literal["squares", "huber", "cauchy"]
 Positive = Literal["irradiance", "light"]
@@ -106,19 +107,12 @@ def recover(
             level = _level(error, trust) if noise is None else noise / scale
             return _SHARES[options.loss](error / level), level
 
-        def again(state, _):
+        def again(state):
             share, level = state
             found, scale = solve_rows(*data, trust * jnp.sqrt(share), level)
             return judged(found, scale), (found, scale)
 
-        ended = optx.fixed_point(
-            again,
-            optx.FixedPointIteration(0.0, options.tolerance),
-            judged(*solve_rows(*data, trust)),
-            has_aux=True,
-            max_steps=options.max_steps,
-            throw=False,
-        )
+        ended = fixed_point(again, judged(*solve_rows(*data, trust)), **iteration)
         found, scale = ended.aux
         result, steps = ended.result, ended.stats["num_steps"]
     light, met = found.light, jnp.zeros((), bool)

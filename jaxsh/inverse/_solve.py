@@ -126,6 +126,25 @@ def triangle(tall: Float[Array, "v p"]) -> Float[Array, "r p"]:
     return jnp.linalg.qr(tall, mode="r")
 
 
+def fixed_point(
+    again: Callable[[Any], tuple[Any, Any]], start: Any, *, tolerance: float, max_steps: int
+) -> optx.Solution:
+    """Repeats `again`, which gives what comes next and more beside it, until all of that rests."""
+
+    def apart(difference):
+        # Optimistix starts from an error in JAX's default float, whatever the dtype of the data.
+        return optx.max_norm(difference).astype(jnp.result_type(float))
+
+    return optx.fixed_point(
+        lambda state, _: again(state),
+        optx.FixedPointIteration(0.0, tolerance, norm=apart),
+        start,
+        has_aux=True,
+        max_steps=max_steps,
+        throw=False,
+    )
+
+
 def covariance(jacobian: Float[Array, "r p"], variance: Float[Array, ""]) -> Float[Array, "p p"]:
     """Covariance variance · (JᵀJ)⁻¹ by singular values; infinite for what J does not determine."""
     jacobian = triangle(jacobian)

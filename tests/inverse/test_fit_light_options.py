@@ -89,7 +89,7 @@ def test_unknown_colors(rng):
     squared = np.bincount(labels, weights**2)
     mean = squared @ colors / squared.sum()
 
-    def fit(observed):
+    def fit(observed, normals=normals):
         return inverse.fit_light(
             observed, normals, mean, 2, materials=labels, weights=weights, prior=PRIOR
         )
@@ -97,6 +97,9 @@ def test_unknown_colors(rng):
     found = fit(clean)
     np.testing.assert_allclose(found.albedo, colors, rtol=1e-4)
     np.testing.assert_allclose(found.value, light[:, :9], rtol=0, atol=2e-3)
+    single = fit(clean, normals.astype(np.float32))
+    assert single.value.dtype == np.float32
+    np.testing.assert_allclose(single.albedo, colors, rtol=2e-3)
 
     ratios = []
     for _ in range(8):
