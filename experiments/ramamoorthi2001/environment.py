@@ -20,7 +20,7 @@ from matplotlib.colors import Normalize
 from jaxsh import harmonics, imaging, sphere
 
 from ..runner import Context, Table, experiment
-from ..shared.pixels import direct_irradiance
+from ..shared.pixels import direct_irradiance, solid_angles
 from ..shared.plots import View, plt, save
 
 ALBEDO = 0.5
@@ -147,9 +147,8 @@ def _rounding(normals, environment, exact) -> float:
     sin_theta = np.sin(theta)[:, None]
     z = np.broadcast_to(np.cos(theta)[:, None], (height, width))
     directions = np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), z], axis=-1)
-    solid_angles = np.diff(-np.cos(np.arange(height + 1) * np.pi / height)) * 2 * np.pi / width
     cosine = np.maximum(directions @ np.asarray(normals, np.float64)[chosen].T, 0)
-    radiance = np.asarray(environment, np.float64) * solid_angles[:, None, None]
+    radiance = np.asarray(environment, np.float64) * solid_angles(height, width)[..., None]
     precise = np.einsum("hwv,hwc->vc", cosine, radiance)
     return float(np.max(np.abs(np.asarray(exact)[chosen] - precise) / precise))
 

@@ -55,10 +55,11 @@ def shade_sun(
         albedo/π Σ_s L_s ∫ V max(0, n·ω) dω + ρ_s Σ_s L_s ∫ V max(0, n·ω) lobe(B·ω) dω
 
     over each source. Unshadowed, integrals over a disc are exact in the first term, also where the
-    horizon cuts it. In the second they are to some 1e-4 of the lobe's own or the disc's, however
-    narrow the lobe, for discs up to 1 sr, and to 6e-3 near a hemisphere. For a source with a
-    `shape` they are sums over its vectors. Of this the share remains that rays see, each weighted
-    by its cosine and by the lobe, though none narrower than rays tell.
+    horizon cuts it. In the second they are to 3e-4 of the lobe's own or the disc's, however narrow
+    the lobe; where the horizon cuts the disc, to 2e-3 up to 0.3 sr and to 8e-3 near a hemisphere
+    (`tests/transfer/test_sun.py`). For a source with a `shape` they are sums over its vectors. Of
+    this the share remains that rays see, each weighted by its cosine and by the lobe, though none
+    narrower than rays tell.
 
     **Arguments**
 
