@@ -32,7 +32,7 @@ _MOST_CODE = 32767  # of int16
 
 
 class Scene(NamedTuple):
-    """Holds a header, which JSON takes, and the bytes of the arrays in the order of `scene.js`."""
+    """Holds a header, which JSON takes, and the bytes of the arrays that it names in their order."""
 
     header: dict[str, Any]
     arrays: bytes
@@ -100,11 +100,25 @@ def make_scene(
         "rowLength": _ROW,
         "rows": rows,
         "layers": len(layers),
-        "albedoPerVertex": codes is not None,
     }
-    arrays = [positions.astype("<f4"), corners.astype("<u4"), layers.astype("<i2")]
-    arrays += [] if codes is None else [codes.astype("<u2")]
-    return Scene(header, b"".join(array.tobytes() for array in arrays))
+    arrays = {
+        "positions": positions.astype("<f4"),
+        "faces": corners.astype("<u4"),
+        "transfer": layers.astype("<i2"),
+    }
+    if codes is not None:
+        arrays["albedoCodes"] = codes.astype("<u2")
+    return packed(header, arrays)
+
+
+def packed(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Scene:
+    """Name arrays, little-endian, in the header and join their bytes, each from a multiple of 4."""
+    facts = [
+        {"name": name, "type": array.dtype.str[1:], "length": array.size}
+        for name, array in arrays.items()
+    ]
+    parts = [array.tobytes() + bytes(-array.nbytes % 4) for array in arrays.values()]
+    return Scene(header | {"arrays": facts}, b"".join(parts))
 
 
 def checked_lights(light: Any, degree: int) -> np.ndarray:

@@ -5,7 +5,10 @@ import re
 from importlib.resources import files
 
 # Each after those that it imports from.
-_MODULES = ("harmonics", "vectors", "scene", "controls", "ball", "renderer", "viewer")
+_MODULES = (
+    *("harmonics", "vectors", "scene", "gl", "controls", "parts", "ball", "pointer", "view"),
+    *("save", "panel", "renderer", "viewer"),
+)
 _IMPORT = re.compile(r"^import\s[^;]*?from\s+\"(\./\w+)\.js\";\n", re.MULTILINE)
 
 

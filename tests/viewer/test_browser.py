@@ -159,7 +159,7 @@ def test_a_drag_orbits_and_sliders_are_moved_by_keys(page):
 def test_the_ball_mirrors_the_light_and_turns_it(page):
     _, _, light, _ = pages.example()
     page.evaluate("new Promise(requestAnimationFrame)")
-    ball = "viewer.ball.context.getImageData(0, 0, 80, 80).data"
+    ball = "viewer.balls[0].context.getImageData(0, 0, 80, 80).data"
     picture = read(page, ball, np.uint8).reshape(80, 80, 4)
     facts = page.evaluate("viewer.scene.camera")
     camera = imaging.Camera(*(np.array(facts[key]) for key in ("position", "target", "up")))
@@ -171,8 +171,8 @@ def test_the_ball_mirrors_the_light_and_turns_it(page):
     radiance = np.asarray(harmonics.evaluate(mirrored, pages.DEGREE)) @ light.T
     found = picture[[40, 20, 70], [40, 60, 30], :3]
     assert abs(found - levels(radiance, 1.5)).max() <= 0.6
-    page.locator(".jaxsh-ball").drag_to(
-        page.locator(".jaxsh-ball"),
+    page.locator(".jaxsh-ball").first.drag_to(
+        page.locator(".jaxsh-ball").first,
         source_position={"x": 20, "y": 40},
         target_position={"x": 60, "y": 40},
     )

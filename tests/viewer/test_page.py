@@ -30,7 +30,7 @@ def colors_of(header: dict, arrays: bytes, light: np.ndarray) -> np.ndarray:
     codes = np.frombuffer(arrays, "<i2", texels, start).reshape(header["layers"], -1, 4)
     codes = codes.swapaxes(0, 1).reshape(codes.shape[1], -1)[:count, : len(header["scales"])]
     albedo = np.broadcast_to(header["albedo"], (count, 3))
-    if header["albedoPerVertex"]:
+    if header["arrays"][-1]["name"] == "albedoCodes":
         last = np.frombuffer(arrays, "<u2", 3 * count, start + 2 * texels)
         albedo = albedo * last.reshape(count, 3) / 65535
     return albedo / np.pi * (codes * np.array(header["scales"]) @ light.T)

@@ -51,13 +51,37 @@ export function button(label, pressed) {
   return { element };
 }
 
-export function panel(title, controls, buttons, hint) {
+// Radio buttons side by side; `set` chooses without calling back.
+export function choice(label, names, changed) {
+  const name = `jaxsh-choice-${++choices}`;
+  const inputs = names.map((_, value) => make("input", { type: "radio", name, value }));
+  inputs.forEach((input, i) => input.addEventListener("change", () => changed(i)));
+  const set = (number) => (inputs[number].checked = true);
+  const labels = names.map((one, i) => make("label", {}, inputs[i], make("span", {}, one)));
+  const element = make("div", { className: "jaxsh-choice" }, ...labels);
+  element.setAttribute("role", "radiogroup");
+  element.setAttribute("aria-label", label);
+  return { element, set };
+}
+
+let choices = 0;
+
+// Controls under a heading that folds them away.
+export function group(title, controls, buttons = []) {
+  const element = make("details", { open: true }, make("summary", {}, title));
+  element.append(...controls.map((control) => control.element));
+  if (buttons.length) {
+    element.append(make("div", { className: "jaxsh-buttons" }, ...buttons.map((one) => one.element)));
+  }
+  return { element };
+}
+
+export function panelOf(title, groups, hint) {
   return make(
     "div",
     { className: "jaxsh-panel" },
     make("h1", {}, title),
-    ...controls.map((control) => control.element),
-    make("div", { className: "jaxsh-buttons" }, ...buttons.map((one) => one.element)),
+    ...groups.map((one) => one.element),
     make("p", {}, hint),
   );
 }

@@ -1,4 +1,5 @@
 // Shades the vertices on the graphics processor, once per light, and draws the mesh.
+import { fill, program } from "./gl.js";
 import { clipMatrix, dot, minus } from "./vectors.js";
 
 // Transfer as 16-bit integers, four coefficients in a texel, vertices along the rows of a layer.
@@ -64,9 +65,6 @@ export class Renderer {
     this.shadeProgram = shade;
     this.showProgram = show;
     this.lightAt = gl.getUniformLocation(shade, "light");
-    this.cameraAt = gl.getUniformLocation(show, "camera");
-    this.exposureAt = gl.getUniformLocation(show, "exposure");
-    this.radiance = gl.createBuffer();
     this.#sendTransfer();
     this.#sendAlbedo();
     this.#sendMesh();
@@ -100,23 +98,30 @@ export class Renderer {
     }
   }
 
+  // Two sides, A and B, have the mesh in common; each has radiance of its own.
   #sendMesh() {
     const { gl, scene } = this;
-    this.showArrays = gl.createVertexArray();
-    gl.bindVertexArray(this.showArrays);
-    fill(gl, gl.ARRAY_BUFFER, gl.createBuffer(), scene.positions);
-    gl.enableVertexAttribArray(POSITION);
-    gl.vertexAttribPointer(POSITION, 3, gl.FLOAT, false, 0, 0);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.radiance);
-    gl.bufferData(gl.ARRAY_BUFFER, 4 * scene.positions.length, gl.DYNAMIC_COPY);
-    gl.enableVertexAttribArray(RADIANCE);
-    gl.vertexAttribPointer(RADIANCE, 3, gl.FLOAT, false, 0, 0);
-    fill(gl, gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer(), scene.faces);
-    gl.bindVertexArray(null);
+    const [positions, faces] = [gl.createBuffer(), gl.createBuffer()];
+    fill(gl, gl.ARRAY_BUFFER, positions, scene.positions);
+    fill(gl, gl.ELEMENT_ARRAY_BUFFER, faces, scene.faces);
+    this.sides = [0, 1].map(() => {
+      const side = { arrays: gl.createVertexArray(), radiance: gl.createBuffer() };
+      gl.bindVertexArray(side.arrays);
+      gl.bindBuffer(gl.ARRAY_BUFFER, positions);
+      gl.enableVertexAttribArray(POSITION);
+      gl.vertexAttribPointer(POSITION, 3, gl.FLOAT, false, 0, 0);
+      gl.bindBuffer(gl.ARRAY_BUFFER, side.radiance);
+      gl.bufferData(gl.ARRAY_BUFFER, 4 * scene.positions.length, gl.DYNAMIC_COPY);
+      gl.enableVertexAttribArray(RADIANCE);
+      gl.vertexAttribPointer(RADIANCE, 3, gl.FLOAT, false, 0, 0);
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, faces);
+      gl.bindVertexArray(null);
+      return side;
+    });
   }
 
-  // Computes every vertex's radiance from a light, three arrays of K coefficients.
-  shade(light) {
+  // Computes every vertex's radiance of a side from a light, three arrays of K coefficients.
+  shade(light, side = 0) {
     const { gl, scene } = this;
     const sent = new Float32Array(12 * scene.layers);
     for (let channel = 0; channel < 3; channel++) {
@@ -131,7 +136,7 @@ export class Renderer {
     if (!scene.albedoCodes) gl.vertexAttrib3f(ALBEDO, 1, 1, 1);
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
-    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, this.radiance);
+    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, this.sides[side].radiance);
     gl.enable(gl.RASTERIZER_DISCARD);
     gl.beginTransformFeedback(gl.POINTS);
     gl.drawArrays(gl.POINTS, 0, scene.positions.length / 3);
@@ -142,87 +147,51 @@ export class Renderer {
     gl.bindVertexArray(null);
   }
 
-  // Draws what the camera sees, on a transparent ground.
-  draw(camera, exposure, width, height) {
-    const { gl, scene } = this;
-    const away = minus(scene.middle, camera.position);
-    const distance = Math.sqrt(dot(away, away));
-    const far = distance + scene.radius;
-    const near = Math.max(distance - scene.radius, far / 1e4);
+  // Makes a picture of this size transparent and empty.
+  clear(width, height) {
+    const { gl } = this;
     gl.viewport(0, 0, width, height);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
-    gl.useProgram(this.showProgram);
-    gl.uniformMatrix4fv(this.cameraAt, false, clipMatrix(camera, width / height, near, far));
-    gl.uniform1f(this.exposureAt, exposure);
-    gl.bindVertexArray(this.showArrays);
+  }
+
+  // Draws what the camera sees of a side into a rectangle of the picture, given by its left and
+  // bottom, its width and height. Without `look`, a program that takes the same attributes and
+  // uniforms, in its colors.
+  draw(camera, exposure, rectangle, side = 0, look = this.showProgram) {
+    const { gl, scene } = this;
+    gl.viewport(...rectangle);
+    gl.useProgram(look);
+    gl.uniformMatrix4fv(gl.getUniformLocation(look, "camera"), false, this.matrix(camera, rectangle));
+    gl.uniform1f(gl.getUniformLocation(look, "exposure"), exposure);
+    gl.bindVertexArray(this.sides[side].arrays);
     gl.drawElements(gl.TRIANGLES, scene.faces.length, gl.UNSIGNED_INT, 0);
     gl.bindVertexArray(null);
   }
 
-  // Linear radiance of the vertices, as `shade` left it: three numbers each.
-  colors() {
+  // From space to clip coordinates, by columns; holds what is within `reach` radii of the middle.
+  matrix(camera, [, , width, height], reach = 1) {
+    const { middle, radius } = this.scene;
+    const away = minus(middle, camera.position);
+    const distance = Math.sqrt(dot(away, away));
+    const far = distance + reach * radius;
+    const near = Math.max(distance - reach * radius, far / 1e4);
+    return clipMatrix(camera, width / height, near, far);
+  }
+
+  // Linear radiance of a side's vertices, as `shade` left it: three numbers each.
+  colors(side = 0) {
     const { gl } = this;
     const colors = new Float32Array(this.scene.positions.length);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.radiance);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.sides[side].radiance);
     gl.getBufferSubData(gl.ARRAY_BUFFER, 0, colors);
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
     return colors;
-  }
-
-  // A picture of any size, one sample in a pixel: RGBA in 8 bits, the top row first.
-  pixels(camera, exposure, width, height) {
-    const { gl } = this;
-    const frame = gl.createFramebuffer();
-    const buffers = [gl.createRenderbuffer(), gl.createRenderbuffer()];
-    const formats = [gl.RGBA8, gl.DEPTH_COMPONENT24];
-    const places = [gl.COLOR_ATTACHMENT0, gl.DEPTH_ATTACHMENT];
-    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
-    buffers.forEach((buffer, i) => {
-      gl.bindRenderbuffer(gl.RENDERBUFFER, buffer);
-      gl.renderbufferStorage(gl.RENDERBUFFER, formats[i], width, height);
-      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, places[i], gl.RENDERBUFFER, buffer);
-    });
-    this.draw(camera, exposure, width, height);
-    const read = new Uint8Array(4 * width * height);
-    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, read);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.deleteFramebuffer(frame);
-    buffers.forEach((buffer) => gl.deleteRenderbuffer(buffer));
-    const rows = [];
-    for (let row = height - 1; row >= 0; row--) {
-      rows.push(read.subarray(4 * width * row, 4 * width * (row + 1)));
-    }
-    const result = new Uint8ClampedArray(read.length);
-    rows.forEach((row, i) => result.set(row, 4 * width * i));
-    return result;
   }
 
   // Gives the graphics memory back: a page may hold few contexts.
   release() {
     this.gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
-}
-
-function fill(gl, target, buffer, values) {
-  gl.bindBuffer(target, buffer);
-  gl.bufferData(target, values, gl.STATIC_DRAW);
-}
-
-function program(gl, vertex, fragment, places, captured = []) {
-  const made = gl.createProgram();
-  for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-    const shader = gl.createShader(type);
-    gl.shaderSource(shader, source);
-    gl.compileShader(shader);
-    gl.attachShader(made, shader);
-  }
-  for (const [name, place] of Object.entries(places)) gl.bindAttribLocation(made, place, name);
-  if (captured.length) gl.transformFeedbackVaryings(made, captured, gl.SEPARATE_ATTRIBS);
-  gl.linkProgram(made);
-  if (!gl.getProgramParameter(made, gl.LINK_STATUS) && !gl.isContextLost()) {
-    throw new Error(`A shader did not compile: ${gl.getProgramInfoLog(made)}`);
-  }
-  return made;
 }

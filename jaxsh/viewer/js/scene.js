@@ -1,19 +1,18 @@
 // What Python sends: a header, and arrays one after the other.
 
-// The arrays of a header over the bytes they are in; no copies.
+const KINDS = {
+  f4: Float32Array, i2: Int16Array, i4: Int32Array, u1: Uint8Array, u2: Uint16Array, u4: Uint32Array,
+};
+
+// The header, and its arrays by name over the bytes they are in; no copies. Each begins at a multiple
+// of four bytes.
 export function unpacked(header, bytes) {
-  const { rowLength, rows, layers, numVertices, numFaces } = header;
-  const parts = [
-    ["positions", Float32Array, 3 * numVertices],
-    ["faces", Uint32Array, 3 * numFaces],
-    ["transfer", Int16Array, 4 * rowLength * rows * layers],
-  ];
-  if (header.albedoPerVertex) parts.push(["albedoCodes", Uint16Array, 3 * numVertices]);
   const scene = { ...header };
   let start = 0;
-  for (const [name, Kind, length] of parts) {
-    scene[name] = new Kind(bytes, start, length);
-    start += scene[name].byteLength;
+  for (const { name, type, length } of header.arrays) {
+    const size = length * KINDS[type].BYTES_PER_ELEMENT;
+    if (start + size <= bytes.byteLength) scene[name] = new KINDS[type](bytes, start, length);
+    start += 4 * Math.ceil(size / 4);
   }
   if (start !== bytes.byteLength) {
     throw new Error(`The viewer expected ${start} bytes of data and got ${bytes.byteLength}.`);

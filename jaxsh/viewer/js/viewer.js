@@ -1,15 +1,17 @@
-// A mesh under a light that can be turned, dimmed and cut: state, pointer, keyboard, panel.
+// A mesh under a light that can be turned, dimmed and cut: its state, and what is drawn of it.
 import { Ball } from "./ball.js";
-import { button, menu, panel, slider, toggle } from "./controls.js";
+import { pictureOf } from "./gl.js";
 import { rotationBlocks, turned } from "./harmonics.js";
+import { makePanel } from "./panel.js";
+import { PARTS } from "./parts.js";
+import { listenToDrags, listenToKeys, listenToWheel } from "./pointer.js";
 import { Renderer } from "./renderer.js";
-import { about, axesOf, minus, multiply, orbited, plus } from "./vectors.js";
+import { saveImage } from "./save.js";
+import { UNTURNED, View } from "./view.js";
 
-const UNTURNED = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 const HINT = "Drag to orbit; drag the mirror ball, or with Shift, to turn the light; wheel or pinch to "
-  + "come near. "
-  + "With the keyboard: arrows, Shift and arrows, + and −.";
-const STEP = Math.PI / 36;
+  + "come near; drag with the right button or two fingers to move. With the keyboard: arrows, Shift and "
+  + "arrows, + and −.";
 
 export class Viewer {
   // Builds picture and panel in `root`. `scene` is what `unpacked` gives.
@@ -17,31 +19,62 @@ export class Viewer {
     this.root = root;
     this.scene = scene;
     this.lights = scene.lights;
-    this.state = this.#start();
+    this.reset();
     this.canvas = document.createElement("canvas");
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", `${scene.title}. ${HINT}`);
     root.classList.add("jaxsh");
-    this.ball = new Ball(scene.degree);
-    root.replaceChildren(this.canvas, this.ball.canvas, this.#panel());
+    this.balls = [new Ball(scene.degree), new Ball(scene.degree)];
+    this.stage = Object.assign(document.createElement("div"), { className: "jaxsh-stage" });
+    this.stage.append(this.canvas, ...this.balls.map((ball) => ball.canvas));
+    this.panel = makePanel(this, HINT);
+    root.replaceChildren(this.stage, this.panel.element);
     root.viewer = this;
     this.#listen();
     this.#build();
   }
 
-  #start() {
+  // Camera, exposure (a factor on that of the scene), rotation (of the light) and whether two sides
+  // are compared are in common; the other facts of a light are those of a side.
+  reset() {
     const { camera, degree } = this.scene;
-    return { camera, degree, index: 0, intensity: 1, exposure: 1, rotation: UNTURNED };
+    const parts = PARTS.map((part) => part.start?.(this.scene) ?? {});
+    const light = Object.assign({ degree, index: 0, intensity: 1 }, ...parts);
+    this.shared = { camera, exposure: 1, rotation: UNTURNED, compare: false };
+    this.sides = [light, light];
+    this.side = 0; // the one that the panel shows and changes
+    if (this.panel) this.set({});
   }
 
-  // Changes some of camera, degree, index (of the light), intensity, exposure (a factor on that of
-  // the scene) and rotation (of the light), and draws when the browser next does.
+  // All facts, those of a light being of one side.
+  stateOf(side) {
+    return { ...this.shared, ...this.sides[side] };
+  }
+
+  get state() {
+    return this.stateOf(this.side);
+  }
+
+  // Changes some facts and draws when the browser next does.
   set(some) {
-    const shades = ["degree", "index", "intensity", "rotation"].some((name) => name in some);
-    this.state = { ...this.state, ...some };
-    this.#show();
+    if (some.compare && !this.shared.compare) this.sides[1] = this.#other(this.sides[0]);
+    if (some.compare === false) this.side = 0;
+    let shades = Object.keys(some).length === 0;
+    for (const [name, value] of Object.entries(some)) {
+      const ofLight = name in this.sides[0];
+      shades ||= ofLight || name === "rotation" || name === "compare";
+      if (ofLight) this.sides[this.side] = { ...this.sides[this.side], [name]: value };
+      else this.shared = { ...this.shared, [name]: value };
+    }
+    this.panel.show(this.state);
     this.#draw(shades);
+  }
+
+  // Chooses the side that the panel changes.
+  choose(side) {
+    this.side = side;
+    this.set({});
   }
 
   setLights(lights) {
@@ -49,27 +82,39 @@ export class Viewer {
     this.#draw(true);
   }
 
-  // The light that shades: three arrays of K coefficients.
-  light() {
-    const { degree, index, intensity, rotation } = this.state;
-    const blocks = rotationBlocks(rotation, this.scene.degree);
-    const kept = (degree + 1) ** 2;
-    return this.lights[index].map((channel) =>
-      turned(channel, blocks).map((x, k) => (k < kept ? intensity * x : 0)),
+  // The light that shades a side: three arrays of K coefficients.
+  light(side = this.side) {
+    const state = this.stateOf(side);
+    const blocks = rotationBlocks(state.rotation, this.scene.degree);
+    const kept = (state.degree + 1) ** 2;
+    const cut = this.lights[state.index].map((channel) =>
+      turned(channel, blocks).map((x, k) => (k < kept ? state.intensity * x : 0)),
     );
+    const changed = (light, part) => part.light?.(light, state, this.scene) ?? light;
+    return PARTS.reduce(changed, cut);
   }
 
   // Linear radiance of the vertices under the present light, three numbers each.
-  colors() {
-    this.renderer.shade(this.light());
-    return this.renderer.colors();
+  colors(side = this.side) {
+    this.#shade(side);
+    return this.renderer.colors(side);
   }
 
   // What the present camera sees, as RGBA in 8 bits, of any size.
-  pixels(width, height) {
-    this.renderer.shade(this.light());
-    const { camera, exposure } = this.state;
-    return this.renderer.pixels(camera, exposure * this.scene.exposure, width, height);
+  pixels(width, height, samples = 1) {
+    this.#shown().forEach((side) => this.#shade(side));
+    return pictureOf(this.renderer.gl, width, height, samples, () => this.#paint(width, height));
+  }
+
+  // Width and height of one view, in pixels of the page.
+  extent() {
+    const { clientWidth, clientHeight } = this.canvas;
+    return this.#rectangles(clientWidth, clientHeight)[0].slice(2);
+  }
+
+  save() {
+    const { width, height } = this.canvas;
+    saveImage(this.pixels(width, height, 4), width, height);
   }
 
   release() {
@@ -78,12 +123,34 @@ export class Viewer {
     this.renderer?.release();
   }
 
+  // With two sides, where B first differs from A: the next light, or else a light of degree 2.
+  #other(light) {
+    const { length } = this.lights;
+    if (length > 1) return { ...light, index: (light.index + 1) % length };
+    return { ...light, degree: light.degree > 2 ? 2 : 0 };
+  }
+
+  #shown() {
+    return this.shared.compare ? [0, 1] : [0];
+  }
+
+  // Left, bottom, width and height of each side: beside or, in a high window, above each other.
+  #rectangles(width, height) {
+    if (!this.shared.compare) return [[0, 0, width, height]];
+    if (width < height) {
+      const half = Math.floor(height / 2);
+      return [[0, height - half, width, half], [0, 0, width, half]];
+    }
+    const half = Math.floor(width / 2);
+    return [[0, 0, half, height], [width - half, 0, half, height]];
+  }
+
   #build() {
     try {
       this.renderer = new Renderer(this.canvas, this.scene);
     } catch (error) {
       this.renderer = null;
-      this.root.append(Object.assign(document.createElement("p"), {
+      this.stage.append(Object.assign(document.createElement("p"), {
         className: "jaxsh-error",
         role: "alert",
         textContent: error.message,
@@ -100,93 +167,49 @@ export class Viewer {
     requestAnimationFrame(() => {
       this.waiting = false;
       if (!this.renderer || this.released) return;
-      const light = this.light();
-      if (this.shades) this.renderer.shade(light);
+      if (this.shades) this.#shown().forEach((side) => this.#shade(side));
       this.shades = false;
-      const { width, height } = this.canvas;
-      const { camera } = this.state;
-      const exposure = this.state.exposure * this.scene.exposure;
-      this.renderer.draw(camera, exposure, width, height);
-      this.ball.draw(light, camera, exposure);
+      this.#paint(this.canvas.width, this.canvas.height);
+      this.#lay();
     });
   }
 
-  #panel() {
-    const stops = (x) => `${x < 0 ? "−" : "+"}${Math.abs(x).toFixed(1)} stops`;
-    const controls = {
-      exposure: slider("Exposure", {
-        min: -5, max: 5, step: 0.1, value: 0, said: stops,
-        changed: (x) => this.set({ exposure: 2 ** x }),
-      }),
-      intensity: slider("Intensity of the light", {
-        min: 0, max: 4, step: 0.05, value: 1, said: (x) => `× ${x.toFixed(2)}`,
-        changed: (intensity) => this.set({ intensity }),
-      }),
-      degree: slider("Degree of the light", {
-        min: 0, max: this.scene.degree, step: 1, value: this.scene.degree, said: String,
-        changed: (degree) => this.set({ degree }),
-      }),
-    };
-    if (this.lights.length > 1) {
-      controls.index = menu("Light", this.scene.names, (index) => this.set({ index }));
-    }
-    this.turning = toggle("Drag turns the light", (on) => (this.turns = on));
-    this.controls = controls;
-    const buttons = [
-      this.turning,
-      button("Reset", () => this.set(this.#start())),
-      button("Save PNG", () => this.#save()),
-    ];
-    const order = ["index", "exposure", "intensity", "degree"].filter((name) => controls[name]);
-    return panel(this.scene.title, order.map((name) => controls[name]), buttons, HINT);
+  #shade(side) {
+    const [light, state] = [this.light(side), this.stateOf(side)];
+    const { renderer, scene } = this;
+    const shaded = PARTS.some((part) => part.shade?.(renderer, light, state, side, scene));
+    if (!shaded) renderer.shade(light, side);
   }
 
-  #show() {
-    const { degree, index, intensity, exposure } = this.state;
-    this.controls.exposure.set(Math.log2(exposure));
-    this.controls.intensity.set(intensity);
-    this.controls.degree.set(degree);
-    this.controls.index?.set(index);
+  #paint(width, height) {
+    const { camera, exposure } = this.shared;
+    this.renderer.clear(width, height);
+    this.#rectangles(width, height).forEach((rectangle, side) => {
+      this.renderer.draw(camera, exposure * this.scene.exposure, rectangle, side);
+    });
   }
 
-  #save() {
-    const { width, height } = this.canvas;
-    const picture = Object.assign(document.createElement("canvas"), { width, height });
-    const pixels = new ImageData(this.pixels(width, height), width, height);
-    picture.getContext("2d").putImageData(pixels, 0, 0);
-    const link = document.createElement("a");
-    link.download = "jaxsh.png";
-    link.href = picture.toDataURL("image/png");
-    link.click();
-  }
-
-  // Angles in radians: the light or the camera, as if the mesh were taken hold of.
-  #turn(across, over, light) {
-    const { camera, rotation } = this.state;
-    if (!light) return this.set({ camera: orbited(camera, across, over) });
-    const [right] = axesOf(camera);
-    const turn = multiply(about(camera.up, across), about(right, over));
-    return this.set({ rotation: multiply(turn, rotation) });
-  }
-
-  #zoom(factor) {
-    const { camera } = this.state;
-    const away = minus(camera.position, camera.target);
-    const distance = Math.hypot(...away) * factor;
-    if (distance < this.scene.radius / 50 || distance > this.scene.radius * 100) return;
-    this.set({ camera: { ...camera, position: plus(camera.target, away, factor) } });
+  // What stands over the picture.
+  #lay() {
+    const { camera, exposure, compare } = this.shared;
+    const { clientWidth, clientHeight } = this.canvas;
+    this.stage.classList.toggle("jaxsh-two", compare);
+    this.balls[1].canvas.hidden = !compare;
+    this.#rectangles(clientWidth, clientHeight).forEach(([left, bottom, , height], side) => {
+      const { canvas } = this.balls[side];
+      canvas.style.translate = `${left}px ${clientHeight - bottom - height}px`;
+      this.balls[side].draw(this.light(side), camera, exposure * this.scene.exposure);
+    });
   }
 
   #listen() {
     const { canvas } = this;
-    this.#listenToDrags(canvas, (event) => event.shiftKey || this.turns);
-    this.#listenToDrags(this.ball.canvas, () => true);
-    const near = (event) => {
-      event.preventDefault();
-      this.#zoom(Math.exp(Math.max(-0.3, Math.min(0.3, event.deltaY / 500))));
-    };
-    canvas.addEventListener("wheel", near, { passive: false });
-    canvas.addEventListener("keydown", (event) => this.#key(event));
+    const view = new View(this);
+    const which = (event) => (event.shiftKey || this.turns ? "light" : "camera");
+    listenToDrags(canvas, view, which);
+    this.balls.forEach((ball) => listenToDrags(ball.canvas, view, () => "light"));
+    listenToWheel(canvas, view);
+    listenToKeys(canvas, view, which, {});
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => !this.released && this.#build());
     this.observer = new ResizeObserver(() => {
@@ -196,44 +219,5 @@ export class Viewer {
       this.#draw(false);
     });
     this.observer.observe(canvas);
-  }
-
-  // A drag turns the light where `light` says so of an event, and otherwise orbits.
-  #listenToDrags(element, light) {
-    const held = new Map();
-    const spread = () => {
-      const [a, b] = [...held.values()];
-      return Math.hypot(a[0] - b[0], a[1] - b[1]);
-    };
-    element.addEventListener("pointerdown", (event) => {
-      held.set(event.pointerId, [event.clientX, event.clientY]);
-      element.setPointerCapture(event.pointerId);
-    });
-    element.addEventListener("pointermove", (event) => {
-      const last = held.get(event.pointerId);
-      if (!last) return;
-      const before = held.size === 2 ? spread() : 0;
-      held.set(event.pointerId, [event.clientX, event.clientY]);
-      if (held.size === 2) return void this.#zoom(before / Math.max(spread(), 1));
-      const { clientWidth, clientHeight } = this.canvas;
-      const scale = Math.PI / Math.min(clientWidth, clientHeight);
-      const [dx, dy] = [event.clientX - last[0], event.clientY - last[1]];
-      this.#turn(dx * scale, dy * scale, light(event));
-    });
-    for (const name of ["pointerup", "pointercancel"]) {
-      element.addEventListener(name, (event) => held.delete(event.pointerId));
-    }
-  }
-
-  #key(event) {
-    const arrows = {
-      ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, -STEP], ArrowDown: [0, STEP],
-    };
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.key in arrows) this.#turn(...arrows[event.key], event.shiftKey || this.turns);
-    else if (event.key === "+" || event.key === "=") this.#zoom(1 / 1.1);
-    else if (event.key === "-") this.#zoom(1.1);
-    else return;
-    event.preventDefault();
   }
 }

@@ -1,0 +1,10 @@
+// What a light can have beyond its coefficients: each part is a file of its own.
+//
+// A part may have
+// - `start(scene)`: what it adds to the state of a light, one for each of the two sides;
+// - `controls(viewer)`: what it adds to the panel: objects with an `element` and `show(state)`, which
+//   is called whenever the state has changed;
+// - `light(coefficients, state, scene)`: other coefficients, three arrays, of those that shade;
+// - `shade(renderer, coefficients, state, side, scene)`: shades instead of `Renderer.shade`, and
+//   returns true where it did.
+export const PARTS = [];

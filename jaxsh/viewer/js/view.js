@@ -1,0 +1,52 @@
+// Changes of a camera and of the light's rotation, from distances on the screen.
+import { about, axesOf, minus, multiply, orbited, plus } from "./vectors.js";
+
+export const UNTURNED = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+
+// How large the picture of a camera is in a window of another shape: the tangent of half its height.
+export function tangentOf(camera, aspect) {
+  return Math.tan((camera.fovY * Math.PI) / 360) * Math.max(1, camera.aspect / aspect);
+}
+
+export class View {
+  // `viewer` has `state`, `set(some)`, `scene`, and `extent()`: width and height of one view, in
+  // pixels of the page.
+  constructor(viewer) {
+    this.viewer = viewer;
+  }
+
+  // Pixels: the camera, or the light, as if the mesh were taken hold of.
+  turn(dx, dy, which) {
+    const scale = Math.PI / Math.min(...this.viewer.extent());
+    this.turnBy(dx * scale, dy * scale, which);
+  }
+
+  // The same in radians.
+  turnBy(across, over, which) {
+    const { camera, rotation } = this.viewer.state;
+    if (which === "camera") return this.viewer.set({ camera: orbited(camera, across, over) });
+    const [right] = axesOf(camera);
+    const turn = multiply(about(camera.up, across), about(right, over));
+    return this.viewer.set({ rotation: multiply(turn, rotation) });
+  }
+
+  // Pixels: the camera beside its target and both alike.
+  move(dx, dy) {
+    const { camera } = this.viewer.state;
+    const [width, height] = this.viewer.extent();
+    const distance = Math.hypot(...minus(camera.position, camera.target));
+    const scale = (2 * distance * tangentOf(camera, width / height)) / height;
+    const [right, up] = axesOf(camera);
+    const moved = (point) => plus(plus(point, right, -dx * scale), up, dy * scale);
+    const [position, target] = [moved(camera.position), moved(camera.target)];
+    this.viewer.set({ camera: { ...camera, position, target } });
+  }
+
+  zoom(factor) {
+    const { state: { camera }, scene: { radius } } = this.viewer;
+    const away = minus(camera.position, camera.target);
+    const distance = Math.hypot(...away) * factor;
+    if (distance < radius / 50 || distance > radius * 100) return;
+    this.viewer.set({ camera: { ...camera, position: plus(camera.target, away, factor) } });
+  }
+}
