@@ -32,7 +32,7 @@ _MOST_CODE = 32767  # of int16
 
 
 class Scene(NamedTuple):
-    """Holds a header, which JSON takes, and the bytes of the arrays that it names in their order."""
+    """Holds a header, which JSON takes, and the bytes of the arrays that it names, in order."""
 
     header: dict[str, Any]
     arrays: bytes
