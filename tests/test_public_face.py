@@ -57,6 +57,7 @@ REASONS = {
         "least_squares": HOST,
         "preetham_constants": NO_ARRAYS,
         "preetham_fit": NO_ARRAYS,
+        "sun_direction": HOST,
         "xyz_to_srgb": NO_ARRAYS,
     },
     "sphere": dict.fromkeys(["cube_map", "fibonacci", "gauss_legendre", "lat_long"], NO_ARRAYS)

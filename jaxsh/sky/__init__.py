@@ -1,5 +1,6 @@
 """Sky light: radiance of daylight, its exact projection, and fits of it (Habel et al. 2008)."""
 
+from ._almanac import sun_direction
 from ._cie import cie_radiance
 from ._color import xyz_to_srgb
 from ._error import FitError, fit_error, smallest_luminance
@@ -41,6 +42,7 @@ __all__ = [
     "project",
     "project_preetham",
     "smallest_luminance",
+    "sun_direction",
     "sun_harmonics",
     "sun_radiance",
     "with_ground",

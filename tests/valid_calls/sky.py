@@ -140,6 +140,15 @@ def calls():
         "smallest_luminance": of(
             k.smallest_luminance, **both, reading="luminance", degree=1, finite="sun turbidity"
         ),
+        "sun_direction": of(
+            k.sun_direction,
+            time=1e9 * floats(4),
+            latitude=floats(4),
+            longitude=floats(4),
+            refraction=True,
+            host=True,
+            finite="time latitude longitude",
+        ),
         "sun_harmonics": of(
             k.sun_harmonics, **both, degree=1, radius=0.005, **checked, finite="sun turbidity"
         ),
