@@ -1,4 +1,4 @@
-"""The blocks of `docs/pytorch.md` and what the page says of them, where torch is installed."""
+"""The blocks of `docs/how-to/use-from-pytorch.md` and what it says of them, where torch is."""
 
 import re
 from pathlib import Path
@@ -10,9 +10,9 @@ import pytest
 
 from jaxsh import harmonics, transfer
 
-torch = pytest.importorskip("torch", reason="torch is not installed: docs/pytorch.md is not tried")
+torch = pytest.importorskip("torch", reason="torch is not installed: its page is not tried")
 
-PAGE = Path(__file__).parents[1] / "docs" / "pytorch.md"
+PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "use-from-pytorch.md"
 
 
 @pytest.fixture(scope="module")
