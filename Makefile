@@ -1,7 +1,8 @@
 # Two commands on a fresh machine with Python >= 3.11:
 #   make reproduce   the main job, on the embedded default (or JAXSH_DATA=folder)
 #   make test        the tests, without the slow ones
-# Also: make test-slow (those, and the examples of the docstrings), make test-all (both), make check
+# Also: make report (all results on a page), make readme (README's figures from results), make
+# test-slow (those, and the examples of the docstrings), make test-all (both), make check
 # (lint, types), make docs (the pages, built strictly), make test-oldest (the oldest JAX that is
 # supported), make test-newest (the newest Python here, and its JAX), make test-minimal (without the
 # packages that only some functions need), make package (wheel and sdist), make bench (beside the
@@ -22,7 +23,7 @@ PARALLEL ?= -n auto --dist loadfile
 # a plain pytest go without.
 QUICK_COMPILE ?= --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false
 
-.PHONY: reproduce test test-slow test-all test-oldest test-newest test-minimal check docs package bench fuzz clean
+.PHONY: reproduce report readme test test-slow test-all test-oldest test-newest test-minimal check docs package bench fuzz clean
 
 # An environment, of another Python where one is named. Groups of dependencies need pip >= 25.1.
 define environment
@@ -63,6 +64,13 @@ $(NEWEST_VENV)/installed: pyproject.toml tools/newest_python.py
 
 reproduce: $(VENV)/installed
 	$(bin)/python -m experiments run first_light environment --preset $(PRESET)
+
+# ALL=--all first runs what is missing or stale.
+report: $(VENV)/installed
+	$(bin)/python -m experiments report $(ALL)
+
+readme: $(VENV)/installed
+	$(bin)/python -m experiments readme
 
 test: $(VENV)/installed
 	$(call quickly,$(VENV)) tests

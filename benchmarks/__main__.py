@@ -1,9 +1,11 @@
-"""``python -m benchmarks [options]``: writes ``results/benchmarks/report.md`` and ``rows.json``."""
+"""``python -m benchmarks [options]``: writes report.md, rows.json and environment.json."""
 
 import dataclasses
+import datetime
 import itertools
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -96,8 +98,13 @@ def run(options: Options) -> Path:
         for row in _measure(request):
             tables[request["table"]].append(row)
             write(options.out / "rows.json", to_json(tables))
-    machine = describe()
     versions = _versions()
+    machine: dict[str, Any] = describe() | {
+        "command": f"python -m benchmarks {shlex.join(sys.argv[1:])}".rstrip(),
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+    }
+    machine["versions"] |= versions
+    write(options.out / "environment.json", to_json(machine))
     facts = [
         f"{machine['cpu']['model']}, {machine['cpu']['count']} cores",
         *(f"{name} {version}" for name, version in versions.items()),
@@ -119,7 +126,7 @@ def run(options: Options) -> Path:
             tables["first_call"],
         ),
         to_markdown(Table("Largest float32 error", _ERRORS), tables["errors"]),
-        f"```\npython -m benchmarks {' '.join(sys.argv[1:])}".rstrip() + "\n```\n",
+        f"```\n{machine['command']}\n```\n",
         f"<sub>{' · '.join(facts)}</sub>\n",
     ]
     write(options.out / "report.md", "\n".join(report))

@@ -6,8 +6,15 @@ python -m experiments list
 python -m experiments run NAME... [options] [overrides]
     run them and write results/NAME/PRESET/
 
+python -m experiments report [NAME...] [--all] [--preset PRESET] [--out results]
+    write report.html and report.md over the results, claims first; --all runs before what is
+    missing or stale
+
 python -m experiments findings [--out results] [--preset quick]
     fill each paper's README from its findings.md and the metrics of the runs
+
+python -m experiments readme [--out results] [--preset paper]
+    fill README.md's figures from the metrics of the runs
 
 python -m experiments run --help
     the options
@@ -25,7 +32,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from . import findings
+from . import findings, overview, readme
 from .config import fill, override
 from .data import VARIABLE, Data
 from .errors import UserError, unknown
@@ -41,10 +48,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command, *rest = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
         if command == "run":
             return _run(rest)
+        if command == "report":
+            return _report(rest)
         if command == "findings":
             return _findings(rest)
+        if command == "readme":
+            return _readme(rest)
         if command not in ("list", "-h", "--help"):
-            raise unknown("command", command, ["list", "run", "findings"])
+            raise unknown("command", command, ["list", "run", "report", "findings", "readme"])
         if rest:
             raise UserError(f"{command}: unexpected argument {rest[0]!r}")
         print(_listing(entries()) if command == "list" else __doc__)
@@ -69,6 +80,49 @@ def _findings(arguments: list[str]) -> int:
         raise UserError(f"findings: unexpected argument {rest[0]!r}")
     print(*findings.fill(entries(), options.out, options.preset), sep="\n")
     return 0
+
+
+def _readme(arguments: list[str]) -> int:
+    parser = _Parser(prog=f"{_PROGRAM} readme", description=readme.__doc__, allow_abbrev=False)
+    add = parser.add_argument
+    add("--out", type=Path, default=Path("results"), help="folder of the results (results)")
+    add("--preset", default="paper", help="whose results are taken up (paper)")
+    options = parser.parse_args(arguments)
+    print(*readme.renew(options.out, options.preset), sep="\n")
+    return 0
+
+
+def _report(arguments: list[str]) -> int:
+    parser = _Parser(prog=f"{_PROGRAM} report", description=overview.__doc__, allow_abbrev=False)
+    add = parser.add_argument
+    add("names", nargs="*", metavar="NAME", help="experiments, or papers' folders (all)")
+    add(
+        "--all",
+        action="store_true",
+        help="run what is missing or stale before; goes on where it was interrupted",
+    )
+    add("--preset", help="results of this preset alone (paper where there are, else the newest)")
+    add("--data", type=Path, help=f"for --all: folder with meshes and envmaps (${VARIABLE})")
+    add("--out", type=Path, default=Path("results"), help="folder of the results (results)")
+    add("--seed", type=int, default=0, help="for --all: seed of the random numbers (0)")
+    add("--no-progress", action="store_false", dest="progress", help="no progress bars")
+    options = parser.parse_args(arguments)
+    known, code = entries(), 0
+    if options.preset and not any(options.preset in entry.presets for entry in known.values()):
+        presets = dict.fromkeys(name for entry in known.values() for name in entry.presets)
+        raise unknown("preset", options.preset, presets)
+    chapters = overview.collect(known, options.names, options.out, options.preset)
+    if options.all:
+        data = Data.find(options.data)
+
+        def run(entry: Entry, preset: str) -> None:
+            chosen = argparse.Namespace(**vars(options) | {"preset": preset})
+            _job(entry.name, known, chosen, [], data).run()
+
+        code = overview.run_due(overview.due(chapters, options.preset), run)
+        chapters = overview.collect(known, options.names, options.out, options.preset)
+    print(*overview.write_pages(chapters, options.out, _PROGRAM + " report"), sep="\n")
+    return code
 
 
 def _run(arguments: list[str]) -> int:
@@ -156,7 +210,7 @@ def _command(name: str, options: argparse.Namespace, overrides: list[str], data:
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        raise UserError(f"run: {message}")
+        raise UserError(f"{self.prog.removeprefix(_PROGRAM).strip()}: {message}")
 
 
 def _parser() -> argparse.ArgumentParser:

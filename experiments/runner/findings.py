@@ -2,15 +2,14 @@
 
 import json
 import re
-import statistics
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from .errors import UserError
+from .places import Place
 from .registry import Entry
 
-_OF = {"min": min, "max": max, "median": statistics.median, "count": len}
 _PLACE = re.compile(r"\{([^{}|]+)\|([^{}]*)\|([^{}|]+)\|([^{}|]*)\}")
 
 
@@ -44,13 +43,11 @@ def _filled(template: Path, known: Mapping[str, str], results: Path, preset: str
             raise UserError(f"{template.parent.name}/findings.md: no results in {str(run)!r}")
         used[known[stem]] = json.loads((run / "environment.json").read_text(encoding="utf-8"))
         rows = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
-        of, _, rest = key.partition(" ")
-        key = rest if of in _OF else key
-        wanted = dict(pair.split("=", 1) for pair in where.split("; ") if pair)
-        values = [row[key] for row in rows if key in row and _meets(row, wanted)]
-        if not values or (of not in _OF and len(values) > 1):
-            raise UserError(f"{template.parent.name}/findings.md: {match[0]}: {len(values)} rows")
-        return format(_OF[of](values) if of in _OF else values[0], style)
+        try:
+            value = Place.read(f"{stem} | {where} | {key}").value(rows)
+        except ValueError as error:
+            raise UserError(f"{template.parent.name}/findings.md: {match[0]}: {error}") from None
+        return format(value, style)
 
     text = _PLACE.sub(number, template.read_text(encoding="utf-8"))
     about = {_about(run): [] for run in used.values()}
@@ -68,11 +65,3 @@ def _about(run: Mapping[str, Any]) -> str:
     names = [f"{name} {version}" for name, version in versions.items() if version]
     data = run["data"] if run["data"].startswith("the ") else "a data folder"
     return ", ".join([run["date"][:10], *names, run["dtype"], data])
-
-
-def _meets(row: Mapping[str, Any], wanted: Mapping[str, str]) -> bool:
-    return all(_text(row.get(key)) == value for key, value in wanted.items())
-
-
-def _text(value: Any) -> str:
-    return format(value, "g") if isinstance(value, float) else str(value)

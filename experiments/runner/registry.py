@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import experiments
 
+from .claims import FILE
 from .config import check
 from .errors import UserError, unknown
 
@@ -78,7 +79,8 @@ def experiment(name: str, *, x64: bool = False):
 
 def entries() -> dict[str, Entry]:
     """All experiments by name, in alphabetical order."""
-    paths = [path for root in experiments.__path__ for path in Path(root).glob("*/*.toml")]
+    found = [path for root in experiments.__path__ for path in Path(root).glob("*/*.toml")]
+    paths = [path for path in found if path.name != FILE]  # which tells of the paper
     return {entry.name: entry for entry in sorted(map(_read, paths), key=lambda entry: entry.name)}
 
 

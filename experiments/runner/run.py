@@ -17,6 +17,7 @@ from .errors import UserError
 from .machine import compile_clock, describe
 from .registry import Entry, Experiment
 from .report import Table, completed, to_csv, to_json, to_markdown, write
+from .sources import digests
 
 
 @dataclasses.dataclass(frozen=True)
@@ -104,6 +105,7 @@ class Job:
             "dtype": "float64" if self.experiment.x64 else "float32",
             "data": self.data.source,
             **describe(),
+            "sources": digests(self.entry.path.with_suffix(".py")),
         }
 
     def _report(self, tables: list[Table], context: Context, machine: dict[str, Any]) -> str:

@@ -1,0 +1,216 @@
+"""The results that are there: what each run left, and whether it still says what the code does."""
+
+import dataclasses
+import functools
+import json
+import re
+import shlex
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .errors import UserError
+from .registry import Entry
+from .sources import changed
+
+# A run's own options, which are no overrides of its config.
+_VALUED = ("--preset", "--seed", "--data", "--out")
+_KINDS = ("paper", "ours", "difference")
+
+
+@dataclasses.dataclass(frozen=True)
+class Shown:
+    """A table as `table.md` has it: cells are texts, `groups` what stands above each column."""
+
+    title: str
+    heads: list[str]
+    groups: list[str]
+    cells: list[list[str]]
+    note: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """Complete results of an experiment."""
+
+    entry: Entry
+    preset: str
+    folder: Path
+
+    @functools.cached_property
+    def rows(self) -> list[dict[str, Any]]:
+        """Every recorded row."""
+        return _json(self.folder / "metrics.json")
+
+    @functools.cached_property
+    def environment(self) -> dict[str, Any]:
+        """What it ran on."""
+        return _json(self.folder / "environment.json")
+
+    @functools.cached_property
+    def stale(self) -> str:
+        """Why the results are not what a run would give now, or "" where nothing says so."""
+        config = tomllib.loads((self.folder / "config.toml").read_text(encoding="utf-8"))
+        ran, wanted = config.get(self.preset, {}), self.entry.presets.get(self.preset)
+        if wanted is None:
+            return f"the preset {self.preset!r} is gone"
+        if self.overrides:
+            return f"settings of its own: {' '.join(self.overrides)}"
+        other = [key for key, value in wanted.items() if ran.get(key) != value]
+        if other:
+            return f"the preset has changed: {', '.join(other)}"
+        if "sources" not in self.environment:
+            return "it does not say from which code"
+        files = changed(self.environment["sources"], self.entry.path.with_suffix(".py"))
+        more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+        return f"the code has changed: {files[0]}{more}" if files else ""
+
+    @property
+    def overrides(self) -> list[str]:
+        """The words of its command that change the config."""
+        words = iter(shlex.split(self.environment["command"])[5:])
+        kept = []
+        for word in words:
+            if word in _VALUED:
+                next(words, None)
+            else:
+                kept.append(word)
+        return kept
+
+    @property
+    def seconds(self) -> float:
+        return self.environment["seconds"]["total"]
+
+    @property
+    def machine(self) -> str:
+        """The machine in a line."""
+        cpu, device = self.environment["cpu"], self.environment["device"]
+        cores = f"{cpu['model']}, {cpu['count']} cores"
+        return cores if device["platform"] == "cpu" else f"{device['kind']} ({cores})"
+
+    @property
+    def about(self) -> list[str]:
+        """Versions, data and time, a fact each."""
+        ran = self.environment
+        commit = (ran["commit"] or "no commit")[:10] + (", changed" if ran["dirty"] else "")
+        return [
+            f"jaxsh {ran['versions']['jaxsh'] or 'from the checkout'} ({commit})",
+            f"JAX {ran['versions']['jax']}",
+            f"Python {ran['python']}",
+            ran["dtype"],
+            f"seed {ran['seed']}",
+            f"{self.data}",
+            f"{ran['seconds']['compile']:.0f} s compiling, {ran['seconds']['run']:.0f} s running",
+        ]
+
+    @property
+    def data(self) -> str:
+        """What it read, without the folder's place."""
+        source = self.environment["data"]
+        return source if source.startswith("the ") else "a data folder"
+
+    @property
+    def date(self) -> str:
+        return self.environment["date"][:10]
+
+    @functools.cached_property
+    def tables(self) -> list[Shown]:
+        return list(_tables((self.folder / "table.md").read_text(encoding="utf-8")))
+
+    @functools.cached_property
+    def pictures(self) -> list[tuple[str, Path]]:
+        """Caption and file of each picture that is still there."""
+        text = (self.folder / "table.md").read_text(encoding="utf-8")
+        found = re.findall(r"^!\[(.*)\]\((.+)\)$", text, re.MULTILINE)
+        return [(said, self.folder / name) for said, name in found if (self.folder / name).exists()]
+
+
+def find(entry: Entry, out: Path, preset: str | None = None) -> Run | None:
+    """The complete results of `preset`; of "paper", else of the newest, where none is named."""
+    wanted = [preset] if preset else list(entry.presets)
+    runs = []
+    for name in wanted:
+        folder = out / entry.name / name
+        needed = ("metrics.json", "environment.json", "config.toml", "table.md")
+        if all((folder / file).exists() for file in needed):
+            run = Run(entry, name, folder)
+            if run.environment.get("status") == "complete":
+                runs.append(run)
+    return max(runs, key=lambda run: (run.preset == "paper", run.environment["date"]), default=None)
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise UserError(f"{str(path)!r} is not what a run writes: {error}") from None
+
+
+def _tables(text: str) -> Iterator[Shown]:
+    """The tables of a `table.md`."""
+    body = re.split(r"^(?:!\[|```)", text, maxsplit=1, flags=re.MULTILINE)[0]
+    for part in re.split(r"^## ", body, flags=re.MULTILINE)[1:]:
+        title, *lines = part.splitlines()
+        cells = [_cells(line) for line in lines if line.startswith("| ")]
+        note = " ".join(line for line in lines if line and not line.startswith("| "))
+        if cells:
+            heads, groups = _heads(cells[0])
+            yield Shown(title, heads, groups, cells[2:], note)
+
+
+def _cells(line: str) -> list[str]:
+    return [cell.strip().replace("\\|", "|") for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+
+
+def _heads(texts: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Headings, and what the paper's, ours and the difference have in common."""
+    heads, groups = [], []
+    for text in texts:
+        group, _, kind = text.rpartition(": ")
+        known = kind in _KINDS
+        heads.append(kind if known else text)
+        groups.append(group if known else "")
+    return heads, groups
+
+
+def in_view(table: Shown, most: int = 6) -> list[bool]:
+    """Which columns to show at first: what tells the rows apart, what the paper has, then others.
+
+    A column that says the same in every row comes last.
+    """
+    count = len(table.heads)
+    if count <= most:
+        return [True] * count
+    varies = [len({row[i] for row in table.cells}) > 1 for i in range(count)]
+    labels = []
+    for i in range(count):
+        if i and (table.groups[i] or all(map(_is_number, (row[i] for row in table.cells)))):
+            break
+        labels.append(i)
+    labels = [i for i in labels if varies[i] or len(table.cells) == 1] or [0]
+    shown = labels[:3]
+    for wanted in (
+        [i for i in range(count) if table.groups[i] and varies[i]],
+        [i for i in range(count) if table.groups[i]],
+        [i for i in range(count) if varies[i]],
+        range(count),
+    ):
+        for i in wanted:
+            if i not in shown and len(shown) < most:
+                shown.append(i)
+    return [i in shown for i in range(count)]
+
+
+def _is_number(text: str) -> bool:
+    return bool(re.fullmatch(r"[–+\-−]?[\d.]*(e[+-]?\d+)?|nan|inf|-inf", text))
+
+
+def commands(run: Mapping[str, Any]) -> str:
+    """The line that makes the results, without the folders of whoever made them."""
+    words = shlex.split(run["command"])
+    for option in ("--out", "--data"):
+        if option in words:
+            place = words.index(option)
+            del words[place : place + 2]
+    return shlex.join(words)

@@ -1,0 +1,289 @@
+"""The page over all results, its verdicts, and what it says of missing and stale ones."""
+
+import html.parser
+import re
+
+import pytest
+
+from experiments.runner import Column, Table, UserError
+from experiments.runner.claims import Claim, judge, read
+from experiments.runner.places import Place
+from experiments.runner.registry import entries
+from experiments.runner.report import to_markdown
+from experiments.runner.results import Shown, _tables, in_view
+
+PAPER = """\
+title = "On Toys"
+cited = "Nobody 1900"
+year = 1900
+
+[[claims]]
+says = "Sums are at least <10>."
+where = "§1"
+what = "the sum at degree 2"
+measure = "toy | degree=2 | sum"
+at_least = 10
+digits = 1
+note = "As `sum` has it."
+
+[[claims]]
+says = "Sums are small."
+where = "§2"
+what = "the largest sum"
+measure = "toy | | max sum"
+at_most = 3
+unit = "kg"
+
+[[claims]]
+says = "Draws are even."
+where = "§3"
+what = "a draw"
+measure = "toy.second | | draw"
+at_least = 0
+"""
+
+ROWS = [
+    {"degree": degree, "kind": kind, "x": degree * sign}
+    for degree in (1, 2, 4)
+    for kind, sign in (("a", 1), ("b", -1))
+]
+
+
+class Page(html.parser.HTMLParser):
+    """Checks that tags are balanced, and collects addresses and texts."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.open, self.addresses, self.ids, self.texts = [], [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.addresses += [values[key] for key in ("href", "src") if key in values]
+        self.ids += [values["id"]] if "id" in values else []
+        if tag not in ("meta", "img", "input"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+@pytest.fixture
+def toy_paper(toys):
+    (toys.folder / "toy" / "paper.toml").write_text(PAPER)
+    return toys
+
+
+def report(toys, *words):
+    code, stdout, stderr = toys("report", "toy", "--out", str(toys.out), *words)
+    return code, stdout, stderr, toys.read("report.html"), toys.read("report.md")
+
+
+def test_the_page_has_verdicts_tables_pictures_and_what_is_missing(toy_paper):
+    toy_paper.run("toy")
+    code, stdout, _, page, markdown = report(toy_paper)
+    assert code == 0
+    assert stdout.split() == [str(toy_paper.out / f"report.{kind}") for kind in ("html", "md")]
+    parsed = Page(page)
+    assert len(parsed.ids) == len(set(parsed.ids))
+    for address in parsed.addresses:  # nothing from elsewhere
+        assert address.startswith("data:") or address.removeprefix("#") in parsed.ids
+    said = " ".join(" ".join(parsed.texts).split())
+    for text in (
+        "Sums are at least <10>. §1",
+        "the sum at degree 2: at least 10.0 12.0 ✓ holds by 2.0 toy quick",
+        "the largest sum: at most 3 kg 12 kg ✗ does not hold 4 times more toy quick",
+        "a draw: at least 0 – ○ open no results of toy.second",
+        "python -m experiments run toy --preset quick",
+        "degree paper ours difference 1 – 6.00 – 2 12.50 12.00 -0.50",
+        "Missing A draw Nobody 1900, table 2",
+    ):
+        assert text in said
+    assert "stale:" not in said
+    assert "| Sums are small. (§2) | the largest sum: at most 3 kg | 12 kg |" in markdown
+    assert "| Nobody 1900 | 1 | 1 | 1 | 1 of 2 | 0 |" in markdown
+    assert "![A dot](toy/quick/dot.png)" in markdown
+    assert "- `toy.second`: A draw (Nobody 1900, table 2)" in markdown
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "why"),
+    [
+        ("value.sum()", "value.sum() * 2", "the code has changed: "),
+        ('"""A toy."""', '"""Another toy."""  # says the same', ""),
+        ("", "", "settings of its own: --degrees 1"),
+    ],
+)
+def test_stale_is_what_the_code_would_no_longer_give(toy_paper, before, after, why):
+    toy_paper.run("toy", *(() if before else ("--degrees", "1")))
+    path = toy_paper.folder / "toy" / "first.py"
+    path.write_text(path.read_text().replace(before, after) if before else path.read_text())
+    page = report(toy_paper)[3]
+    assert (f"stale: {why}" if why else "stale: ") in page or not why
+    assert bool(why) == ("stale: " in page)
+
+
+def test_stale_is_what_a_changed_preset_would_not_give(toy_paper):
+    toy_paper.run("toy")
+    path = toy_paper.folder / "toy" / "first.toml"
+    path.write_text(path.read_text().replace("[1, 2]", "[1]"))
+    assert "stale: the preset has changed: degrees" in report(toy_paper)[3]
+
+
+def test_all_runs_what_is_missing_and_no_more(toy_paper):
+    code, _, stderr, page, _ = report(toy_paper, "--all")
+    assert code == 0
+    assert "[1/2] toy · quick (no results)" in stderr
+    assert "[2/2] toy.second · quick (no results)" in stderr
+    assert "<h3>Missing</h3>" not in page
+    assert report(toy_paper, "--all")[2] == ""
+    path = toy_paper.folder / "toy" / "first.toml"
+    path.write_text(path.read_text().replace("[1, 2]", "[2]"))
+    stderr = report(toy_paper, "--all")[2]
+    assert re.search(r"\[1/1\] toy · quick \(.*degrees\); 0 s so far, about \d+ s to go", stderr)
+
+
+def test_all_goes_on_where_it_was_interrupted(toy_paper):
+    path = toy_paper.folder / "toy" / "second.toml"
+    path.write_text(path.read_text().replace("[quick]", "[quick]\nmood = 'hasty'"))
+    module = toy_paper.folder / "toy" / "first.py"
+    text = module.read_text()
+    haste = 'if config.mood == "hasty":\n        raise KeyboardInterrupt\n    '
+    module.write_text(text.replace('context.record({"draw"', haste + 'context.record({"draw"'))
+    code, _, stderr, page, _ = report(toy_paper, "--all")
+    assert code == 130
+    assert "goes on from here" in stderr
+    assert "✓ holds" in page  # what was done before is shown
+    path.write_text(path.read_text().replace("hasty", "calm"))
+    code, _, stderr, *_ = report(toy_paper, "--all")
+    assert code == 1 or "[1/1] toy.second" in stderr
+
+
+def test_a_failure_does_not_keep_the_others(toy_paper):
+    path = toy_paper.folder / "toy" / "first.toml"
+    path.write_text(path.read_text().replace("[1, 2]", '[1, 4]\nmood = "angry"'))
+    code, _, stderr, page, _ = report(toy_paper, "--all")
+    assert code == 1
+    assert "1 of 2 failed: toy" in stderr
+    assert "a draw: at least 0" in page
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["toyy"], "unknown experiment or paper 'toyy'; did you mean 'toy'?"),
+        (["--preset", "papr"], "unknown preset 'papr'; did you mean 'paper'?"),
+        (["--al", "yes"], "report: "),
+    ],
+)
+def test_mistakes(toys, words, sentence):
+    assert sentence in toys.refused("report", "--out", str(toys.out), *words)
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("at_least = 10", "toy/paper.toml: 'Sums are at least <10>.' has neither at_least nor"),
+        ("measure = ", "toy/paper.toml: 'Sums are at least <10>.': Claim"),
+        ("title = ", "toy/paper.toml: Paper"),
+    ],
+)
+def test_claims_that_say_too_little(toys, line, sentence):
+    path = toys.folder / "toy" / "paper.toml"
+    lines = PAPER.splitlines()
+    number = next(i for i, one in enumerate(lines) if one.startswith(line))
+    path.write_text("\n".join(lines[:number] + lines[number + 1 :]))
+    assert sentence in toys.refused("report", "--out", str(toys.out))
+    path.write_text(PAPER.replace("at_least = 10", "at_lest = 10"))
+    assert "unknown key 'at_lest'; did you mean 'at_least'?" in toys.refused("report")
+    path.write_text(PAPER.replace("at_least = 10", "at_least = '10'"))
+    assert "at_least should be a number, not '10'" in toys.refused("report")
+    path.write_text(PAPER.replace("toy.second", "toy.secnd"))
+    assert "toy/paper.toml: unknown experiment 'toy.secnd'" in toys.refused("report")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("e | degree=2; kind=a | x", 2),
+        ("e | degree>=2; kind=b | min x", -4),
+        ("e | degree<2; kind!=b | x", 1),
+        ("e | kind=a | median x", 2),
+        ("e | degree>1 | count x", 4),
+    ],
+)
+def test_places(text, value):
+    assert Place.read(text).value(ROWS) == value
+
+
+def test_places_that_name_no_number():
+    for text in ("e | degree=2 | x", "e | degree=3 | max x", "e | | y"):
+        with pytest.raises(ValueError, match="rows"):
+            Place.read(text).value(ROWS)
+    for text in ("e | x", "e | degree | x", " | | x"):
+        with pytest.raises(UserError, match="expected"):
+            Place.read(text)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "holds", "margin"),
+    [
+        ({"at_least": 3.0}, "holds", "by 1 m"),
+        ({"at_most": 3.0}, "does not hold", "by 1 m"),
+        ({"at_most": 0.04}, "does not hold", "1e+02 times more"),
+        ({"at_least": 3.0, "at_most": 9.0}, "holds", "by 1 m"),
+        ({"at_least": 4.0, "preset": "paper"}, "open", "only the preset paper can tell"),
+        ({"at_least": 4.0, "over": Place.read("e | degree=9 | x")}, "open", "not measured"),
+        ({"at_least": -1.0, "minus": Place.read("e | kind=b | max x")}, "holds", "by 6 m"),
+        ({"at_most": 2.0, "over": Place.read("e | degree=2; kind=a | x")}, "holds", "by 0 m"),
+    ],
+)
+def test_verdicts(bounds, holds, margin):
+    claim = Claim("", "", Place.read("e | kind=a | max x"), "", unit="m", **bounds)
+    verdict = judge(claim, {"e": ROWS}, {"e": "quick"})
+    assert verdict.holds == holds
+    assert verdict.margin.startswith(margin)
+
+
+def test_a_number_that_is_none_does_not_hold():
+    claim = Claim("", "", Place.read("e | | x"), "", at_least=1.0)
+    assert judge(claim, {"e": [{"x": "NaN"}]}, {"e": "quick"}).holds == "does not hold"
+
+
+def test_claims_of_the_papers_name_experiments_and_notes_are_sentences():
+    known = entries()
+    for folder in {entry.path.parent for entry in known.values()}:
+        paper = read(folder)
+        assert paper.claims, folder
+        for claim in paper.claims:
+            assert set(claim.experiments) <= set(known)
+            assert claim.says.endswith(".")
+            assert claim.where
+
+
+def test_a_table_is_read_back_as_it_was_written():
+    columns = [Column("mesh", "mesh"), Column("fps", "fps: a", paper="fps_paper", digits=1)]
+    rows = [{"mesh": "a|b", "fps": 2.0, "fps_paper": 1.5}, {"mesh": "c", "fps": 3.0}]
+    text = to_markdown(Table("T", columns, note="Two\nlines."), rows)
+    [table] = _tables(f"# head\n\n{text}\n![p](p.png)\n\n## no table\n")
+    assert table == Shown(
+        "T",
+        ["mesh", "paper", "ours", "difference"],
+        ["", "fps: a", "fps: a", "fps: a"],
+        [["a|b", "1.5", "2.0", "+0.5"], ["c", "–", "3.0", "–"]],
+        "Two lines.",
+    )
+
+
+def test_six_columns_in_view_tell_rows_apart_and_have_the_papers():
+    heads = ["light", "mesh", "degree", "a", "b", "paper", "ours", "difference", "c"]
+    groups = ["", "", "", "", "", "fps", "fps", "fps", ""]
+    cells = [[name, "knot", "4", "1", name, "2", str(i), "4", "5"] for i, name in enumerate("xyz")]
+    table = Shown("", heads, groups, cells, "")
+    seen = [head for head, seen in zip(heads, in_view(table), strict=True) if seen]
+    assert seen == ["light", "mesh", "b", "paper", "ours", "difference"]
+    assert all(in_view(table, most=9))
