@@ -17,7 +17,7 @@ WHEEL_NEEDS = {
 SOURCE_NEEDS = {
     *("CITATION.cff", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "Makefile", "mkdocs.yml"),
     *("README.md", "conftest.py", "docs/index.md", "docs/images/first_light.png"),
-    *("experiments/__main__.py", "tests/conftest.py", "tools/fence_examples.py", ".ci/run"),
+    *("experiments/__main__.py", "tests/conftest.py", "tools/floors.py", ".ci/run"),
     *("notebooks/01_harmonics.ipynb", "benchmarks/__main__.py"),
 }
 
