@@ -1,4 +1,4 @@
-"""``python tools/make_first_picture.py``: the picture of docs/index.md, by the code that stands there."""
+"""``python tools/make_first_picture.py``: the picture of docs/index.md, by its code."""
 
 import contextlib
 import re

@@ -71,8 +71,9 @@ def _rank(member: griffe.Object | griffe.Alias) -> int:
 
 def _is_by_fields(cls: griffe.Class) -> bool:
     known = {str(base).split("[")[0] for base in cls.bases}
-    return bool(known & _BY_FIELDS) or any(_is_by_fields(base) for base in cls.resolved_bases
-                                           if isinstance(base, griffe.Class))
+    return bool(known & _BY_FIELDS) or any(
+        _is_by_fields(base) for base in cls.resolved_bases if isinstance(base, griffe.Class)
+    )
 
 
 def _add_constructor(cls: griffe.Class) -> None:
@@ -107,7 +108,9 @@ def _default(field: griffe.Attribute) -> Any:
     value = field.value
     if not (isinstance(value, griffe.ExprCall) and str(value.function).endswith("field")):
         return value
-    options = {one.name: one.value for one in value.arguments if isinstance(one, griffe.ExprKeyword)}
+    options = {
+        one.name: one.value for one in value.arguments if isinstance(one, griffe.ExprKeyword)
+    }
     if str(options.get("init")) == "False":
         return ...
     return options.get("default")

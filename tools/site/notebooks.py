@@ -86,7 +86,7 @@ def on_files(files: Files, config: Any, **_: Any) -> Files:
             f"    **[{title}]({path.stem}.md)**\n\n    {about}"
         )
     listed = "\n\n".join(cards)
-    index = f"{_INDEX}\n<div class=\"grid cards pictured\" markdown>\n\n{listed}\n\n</div>\n"
+    index = f'{_INDEX}\n<div class="grid cards pictured" markdown>\n\n{listed}\n\n</div>\n'
     files.append(File.generated(config, "tutorials/index.md", content=index))
     return files
 
@@ -105,9 +105,7 @@ def _opening(notebook: nbformat.NotebookNode) -> tuple[str, str]:
     return heading.removeprefix("# "), " ".join(rest.strip().split("\n\n")[0].split())
 
 
-def _shown(
-    notebook: nbformat.NotebookNode, stem: str, pictures: dict[str, bytes]
-) -> Iterator[str]:
+def _shown(notebook: nbformat.NotebookNode, stem: str, pictures: dict[str, bytes]) -> Iterator[str]:
     """The cells as Markdown; `pictures` gets what they drew, by name."""
     title, _ = _opening(notebook)
     for number, cell in enumerate(notebook.cells):
