@@ -35,7 +35,8 @@ class ApiPages(griffe.Extension):
         for module in _folders(pkg):
             if module.exports:
                 names = [name if isinstance(name, str) else name.name for name in module.exports]
-                module.exports = sorted(names, key=lambda name: _rank(module.members[name]))
+                ranks = {name: _rank(module.members[name]) for name in names}
+                module.exports = [*sorted(names, key=ranks.__getitem__)]
 
 
 def _members(one: Any) -> list[Any]:
@@ -49,7 +50,7 @@ def _spelled(annotation: Any) -> Any:
         return griffe.ExprBinOp(left, annotation.operator, right)
     if isinstance(annotation, griffe.ExprName):
         try:
-            target = annotation.parent[annotation.name]  # pyright: ignore
+            target: Any = annotation.parent[annotation.name]  # pyright: ignore
             target = target.final_target if target.is_alias else target
         except (KeyError, griffe.AliasResolutionError):
             return annotation

@@ -1,7 +1,7 @@
 """What must hold of the pages as built: a hook of MkDocs, whose warnings a strict build fails on.
 
-Every link leads to a page, a file or an anchor that is there; nothing is taken from the network; the
-search finds what people look for.
+Every link leads to a page, a file or an anchor that is there; nothing is taken from the network;
+the search finds what people look for.
 """
 
 import json

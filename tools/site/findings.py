@@ -1,7 +1,7 @@
 """What the experiments found, on the pages of the papers: a hook of MkDocs.
 
-A line `<!-- findings: FOLDER -->` of a page is replaced by what stands in experiments/FOLDER/README.md
-below its title.
+A line `<!-- findings: FOLDER -->` of a page is replaced by what stands below the title of
+experiments/FOLDER/README.md.
 """
 
 import re

@@ -26,7 +26,10 @@ def _replace(found: re.Match[str]) -> str:
 @functools.cache
 def to_mathml(latex: str, display: str = "inline") -> str:
     """Convert one formula; in the search index it would be noise."""
+    for name, bar in (("vert", "|"), ("Vert", r"\|")):
+        latex = latex.replace(rf"\l{name}", rf"\left{bar}").replace(rf"\r{name}", rf"\right{bar}")
     made = convert(latex, display=display)
+    made = made.replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">/</mo>')
     made = made.replace("<math ", "<math data-search-exclude ", 1)
     if display == "block":
         return f'<div class="formula">{made}</div>'

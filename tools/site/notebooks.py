@@ -26,7 +26,7 @@ _KEPT = ROOT / ".cache" / "notebooks"
 
 
 def execute(path: Path) -> nbformat.NotebookNode:
-    """The notebook with its outputs; raises with the cell where one fails, warns or draws nothing."""
+    """The notebook with its outputs; raises where a cell fails or warns, or none draws."""
     kept = _KEPT / f"{path.stem}-{_state(path)}.ipynb"
     if kept.exists():
         return nbformat.read(kept, as_version=4)
@@ -93,9 +93,9 @@ def on_files(files: Files, config: Any, **_: Any) -> Files:
 
 _INDEX = """# Tutorials
 
-Each tutorial is a notebook of the checkout's `notebooks/`, executed while this page was built: what it
-prints and draws is what came out. They run without data, in half a minute or less, and end with an
-exercise. Open one yourself with `jupyter lab notebooks/`.
+Each tutorial is a notebook of the checkout's `notebooks/`, executed while this page was built: what
+it prints and draws is what came out. They run without data, and end with an exercise. Open
+one yourself with `jupyter lab notebooks/`.
 """
 
 
