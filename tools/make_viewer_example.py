@@ -13,8 +13,9 @@ from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import ArrayLike
 
-from jaxsh import geometry, harmonics, imaging, sky, sphere, transfer, viewer
+from jaxsh import adaptive, geometry, harmonics, imaging, sky, sphere, transfer, viewer
 
 DEGREE = 6
 
@@ -37,8 +38,23 @@ def make_page(path: Path) -> Path:
         mesh.faces,
         albedo=np.array([0.8, 0.62, 0.48]),
         names=list(lights),
+        values=values_of(mesh, baked, studio),
         title="A knot to relight",
     )
+
+
+def values_of(mesh: geometry.Mesh, baked: transfer.Transfer, light: ArrayLike) -> dict:
+    """What the vertices see of an even sky, and to which degree Lee & Kim's filter goes there."""
+    seen = baked.coefficients[:, 0] * np.sqrt(4 / np.pi)  # 1 without shadows and bounces
+    material = transfer.Material(0.5, 0.3, 20.0)
+    eye = imaging.Camera.facing(mesh).position
+    method = adaptive.Levels(threshold=0.1)
+    result = adaptive.shade(light, baked, eye, material, method)
+    kept = np.asarray(result.shown_degree["specular"])
+    return {
+        "Even light that arrives": np.asarray(seen),
+        "Glossy degree kept (Lee & Kim)": kept,
+    }
 
 
 def make_picture(page: Path, path: Path) -> None:

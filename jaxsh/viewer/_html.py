@@ -5,7 +5,7 @@ import gzip
 import html
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
 
@@ -29,6 +29,7 @@ def export_html(
     exposure: float | None = None,
     names: Sequence[str] | None = None,
     title: str = "jaxsh",
+    values: Mapping[str, ArrayLike] | None = None,
 ) -> Path:
     """Write a mesh to one HTML file, in which it is seen from all sides and relit.
 
@@ -54,6 +55,10 @@ def export_html(
       `imaging.auto_exposure` of all vertices under the first light.
     - `names`: of the lights in the menu.
     - `title`: of the page.
+    - `values`: further numbers (V,) at the vertices by name, to be shown in false color. Floats run
+      through the colors from the least to the greatest. Integers of at most 8 kinds are levels with
+      a color each, laid over the picture: of an `adaptive.AdaptiveResult`,
+      `shown_degree["specular"]` shows how far Lee & Kim's filter went at each vertex.
 
     **Returns** the path. Runs on the host. Raises `ValueError` for shapes and degrees that do not
     fit, for values that are not finite and for an albedo below 0, `TypeError` for objects of
@@ -72,7 +77,7 @@ def export_html(
     ('knot.html', True)
     """
     path = as_path(path)
-    scene = make_scene(transfer, light, faces, albedo, camera, exposure, names, title)
+    scene = make_scene(transfer, light, faces, albedo, camera, exposure, names, title, values)
     arrays = base64.b64encode(gzip.compress(scene.arrays, mtime=0)).decode("ascii")
     page = Template(text("page.html")).substitute(
         title=html.escape(title),

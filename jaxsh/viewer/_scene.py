@@ -1,7 +1,7 @@
 """Packs what a page is sent: a header of numbers and names, and the arrays of a mesh."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -23,6 +23,7 @@ from ..geometry import Mesh
 from ..harmonics import num_coefficients
 from ..imaging import Camera, auto_exposure
 from ..transfer import Transfer
+from ._values import packed_values
 
 # Degrees that are tried in a browser; WebGL2 promises registers for a few more.
 MOST_DEGREE = 10
@@ -54,6 +55,7 @@ def make_scene(
     exposure: float | None,
     names: Sequence[str] | None,
     title: str,
+    values: Mapping[str, ArrayLike] | None,
 ) -> Scene:
     """Check all and pack it; raises `ValueError` or `TypeError` for what does not fit."""
     check_type("transfer", transfer, Transfer)
@@ -63,6 +65,7 @@ def make_scene(
         raise ValueError(f"expected at most {_ROW * _MOST_ROWS} points of transfer, got {count}")
     corners = _checked_faces(faces, count)
     shared, codes = _packed_albedo(albedo, count)
+    value_facts, value_codes = packed_values(values, count)
     if exposure is not None:
         exposure = check_number("exposure", exposure, above=0.0)
     check_type("title", title, str)
@@ -100,6 +103,7 @@ def make_scene(
         "rowLength": _ROW,
         "rows": rows,
         "layers": len(layers),
+        "values": value_facts,
     }
     arrays = {
         "positions": positions.astype("<f4"),
@@ -108,7 +112,7 @@ def make_scene(
     }
     if codes is not None:
         arrays["albedoCodes"] = codes.astype("<u2")
-    return packed(header, arrays)
+    return packed(header, arrays | value_codes)
 
 
 def packed(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Scene:

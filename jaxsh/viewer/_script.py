@@ -6,8 +6,20 @@ from importlib.resources import files
 
 # Each after those that it imports from.
 _MODULES = (
-    *("harmonics", "vectors", "scene", "gl", "controls", "parts", "ball", "pointer", "view"),
-    *("save", "panel", "renderer", "viewer"),
+    *(
+        "harmonics",
+        "vectors",
+        "scene",
+        "gl",
+        "controls",
+        "parts",
+        "ball",
+        "pointer",
+        "view",
+        "save",
+    ),
+    *("ramp", "color_bar", "picking", "python_text", "overlay", "panel", "renderer", "false_color"),
+    *("lobe", "viewer"),
 )
 _IMPORT = re.compile(r"^import\s[^;]*?from\s+\"(\./\w+)\.js\";\n", re.MULTILINE)
 

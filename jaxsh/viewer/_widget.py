@@ -2,7 +2,7 @@
 
 import base64
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,7 @@ def view(
     exposure: float | None = None,
     names: Sequence[str] | None = None,
     title: str = "jaxsh",
+    values: Mapping[str, ArrayLike] | None = None,
     height: int = 480,
 ) -> "AnyWidget":
     """Show a mesh in a notebook, to be seen from all sides and relit there and from Python.
@@ -57,7 +58,7 @@ def view(
     ...     assert "anywidget" in str(error)
     """
     height = check_size("height", height, 100)
-    scene = make_scene(transfer, light, faces, albedo, camera, exposure, names, title)
+    scene = make_scene(transfer, light, faces, albedo, camera, exposure, names, title, values)
     return _widget_class()(scene, height, Still(transfer, faces, albedo, height))
 
 

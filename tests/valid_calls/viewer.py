@@ -17,6 +17,7 @@ def calls():
         "exposure": 1.0,
         "names": ["studio"],
         "title": "jaxsh",
+        "values": {"height": floats(made().num_points)},
     }
     rules = {"finite": "light albedo exposure", "host": True}
     return {

@@ -4,13 +4,18 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { pathToFileURL } from "node:url";
 
-const { folder, turns, basisAt, cameras, header, bytes, text } = JSON.parse(
+const { folder, turns, basisAt, cameras, header, bytes, text, ramp, transferOf: one, picked } = JSON.parse(
   readFileSync(process.env.VIEWER_NUMBERS, "utf8"),
 );
 const load = (name) => import(pathToFileURL(`${folder}/${name}.js`));
 const { basis, rotationBlocks, turned } = await load("harmonics");
 const { about, axesOf, clipMatrix, dot, minus, multiply, orbited } = await load("vectors");
 const { decompressed, unpacked } = await load("scene");
+
+const { rampColor } = await load("ramp");
+const { rayAt, transferOf, vertexAt } = await load("picking");
+const { shortNumber } = await load("color_bar");
+const { pythonText } = await load("python_text");
 
 const near = (found, expected, tolerance) => {
   assert.equal(found.length, expected.length);
@@ -84,4 +89,39 @@ test("arrays come out of the page as they went in", async () => {
   near(scene.positions.slice(0, 3), header.first, 0);
   assert.equal(scene.albedoCodes.length, 3 * header.numVertices);
   assert.throws(() => unpacked(header, new ArrayBuffer(bytes + 4)), /expected \d+ bytes/);
+});
+
+test("the ramp is matplotlib's viridis, within two levels", () => {
+  ramp.forEach((color, i) => near(rampColor(i / 255), color, 2 / 255));
+});
+
+test("a vertex's transfer is what Python sent, to 16 bits", async () => {
+  const scene = unpacked(header, await decompressed(text));
+  const found = transferOf(scene, one.vertex);
+  assert.equal(found.length, one.expected.length);
+  found.forEach((x, k) => assert.ok(Math.abs(x - one.expected[k]) <= 0.51 * header.scales[k]));
+});
+
+test("a click finds the vertex that rays find", async () => {
+  const scene = unpacked(header, await decompressed(text));
+  for (const { origin, direction, expected } of picked) {
+    assert.equal(vertexAt(scene, { origin, direction }), expected);
+  }
+  assert.ok(new Set(picked.map(({ expected }) => expected)).size > 5);
+  const { camera, points, pixels } = cameras[1];
+  points.forEach((point, i) => {
+    const { direction } = rayAt(camera, pixels[i], camera.aspect);
+    const away = minus(point, camera.position);
+    const cosine = dot(away, direction) / Math.hypot(...away) / Math.hypot(...direction);
+    assert.ok(Math.abs(cosine - 1) < 1e-12);
+  });
+});
+
+test("numbers and a turned light in words", () => {
+  const said = [0, -0.5, 12345.6, 1.23456e-7, 2.5e6].map(shortNumber);
+  assert.deepEqual(said, ["0", "−0.5", "12350", "1.23e−7", "2.50e+6"]);
+  const [{ camera }] = cameras;
+  const text = pythonText({ camera, rotation: about([0, 0, 1], 0.5) }, 0.25, 30, 40);
+  assert.match(text, /rotation = \[\[0.877582562, -0.479425539, 0\]/);
+  assert.match(text, /exposure = 0.25\n/);
 });

@@ -152,14 +152,14 @@ def test_a_drag_orbits_and_sliders_are_moved_by_keys(page):
     assert page.evaluate("viewer.state.degree") == pages.DEGREE - 1
     page.get_by_label("Exposure").press("ArrowRight")
     assert page.evaluate("viewer.state.exposure") == pytest.approx(2**0.1)
-    page.get_by_role("combobox").select_option("Light 2")
+    page.locator("select").first.select_option("Light 2")
     assert page.evaluate("viewer.state.index") == 1
 
 
 def test_the_ball_mirrors_the_light_and_turns_it(page):
     _, _, light, _ = pages.example()
     page.evaluate("new Promise(requestAnimationFrame)")
-    ball = "viewer.balls[0].context.getImageData(0, 0, 80, 80).data"
+    ball = "viewer.overlay.balls[0].context.getImageData(0, 0, 80, 80).data"
     picture = read(page, ball, np.uint8).reshape(80, 80, 4)
     facts = page.evaluate("viewer.scene.camera")
     camera = imaging.Camera(*(np.array(facts[key]) for key in ("position", "target", "up")))

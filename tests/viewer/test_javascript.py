@@ -7,6 +7,7 @@ import subprocess
 from importlib.resources import files
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pages
 import pytest
@@ -50,6 +51,29 @@ def cameras(rng) -> list[dict]:
     return made
 
 
+def picked(rng, mesh) -> list[dict]:
+    """Rays, and the vertex nearest to where each first solves o + t d = a + u b + v c; or None."""
+    corners = np.asarray(mesh.vertices, np.float64)[np.asarray(mesh.faces)]
+    made = []
+    for _ in range(12):
+        origin = rng.normal(size=3)
+        origin *= 5 / np.linalg.norm(origin)
+        direction = rng.uniform(-0.8, 0.8, size=3) - origin
+        ways = np.broadcast_to(-direction, corners[:, 0].shape)
+        edges = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        right = (origin - corners[:, 0])[..., None]
+        u, v, t = np.linalg.solve(np.stack([*edges, ways], axis=-1), right)[..., 0].T
+        hit = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), t, np.inf)
+        face = hit.argmin()
+        apart = np.linalg.norm(corners[face] - origin - hit[face] * direction, axis=1)
+        # By the weights, which rank corners of a long triangle otherwise than distances do.
+        largest = np.argmax([1 - u[face] - v[face], u[face], v[face]])
+        found = None if np.isinf(hit[face]) else int(mesh.faces[face, largest])
+        assert found is None or apart[largest] < 0.2
+        made.append({"origin": origin, "direction": direction, "expected": found})
+    return made
+
+
 @pytest.mark.skipif(NODE is None, reason="needs node, which is not here")
 def test_pure_javascript_agrees_with_python(rng, tmp_path):
     mesh, made, light, albedo = pages.example()
@@ -62,6 +86,9 @@ def test_pure_javascript_agrees_with_python(rng, tmp_path):
         "cameras": cameras(rng),
         "header": header | {"first": np.asarray(mesh.vertices[0])},
         "bytes": len(arrays),
+        "ramp": matplotlib.colormaps["viridis"](np.linspace(0, 1, 256))[:, :3],
+        "transferOf": {"vertex": 123, "expected": np.asarray(made.coefficients)[123]},
+        "picked": picked(rng, mesh),
         "text": pages.ARRAYS.search(page.read_text("utf-8"))[1],
     }
     path = tmp_path / "numbers.json"
@@ -73,4 +100,4 @@ def test_pure_javascript_agrees_with_python(rng, tmp_path):
         text=True,
     )
     assert run.returncode == 0, run.stdout + run.stderr
-    assert "pass 7" in run.stdout
+    assert "pass 11" in run.stdout

@@ -101,6 +101,51 @@ def test_every_file_of_the_page_is_used():
     assert {"page.html", "style.css"} < {file.name for file in JS}
 
 
+def test_values_become_ramps_and_levels(tmp_path):
+    mesh, made, light, _ = pages.example()
+    count = len(mesh.vertices)
+    height = np.asarray(mesh.vertices, np.float64)[:, 2]
+    given = {
+        "height": height,
+        "degree": np.arange(count) % 3 + 2,
+        "seen": np.arange(count) % 2 == 0,
+        "number": np.arange(count),
+        "one": np.zeros(count),
+    }
+    page = viewer.export_html(tmp_path / "v.html", made, light[:, :4], mesh.faces, values=given)
+    header, arrays, _ = pages.parts(page)
+    kinds = [(one["name"], one["kind"], one.get("labels")) for one in header["values"]]
+    assert kinds == [
+        ("height", "ramp", None),
+        ("degree", "levels", ["2", "3", "4"]),
+        ("seen", "levels", ["no", "yes"]),
+        ("number", "ramp", None),
+        ("one", "ramp", None),
+    ]
+    codes = np.frombuffer(arrays, "<u2", 5 * count, len(arrays) - 10 * count).reshape(5, -1)
+    low, high = header["values"][0]["low"], header["values"][0]["high"]
+    np.testing.assert_allclose(low + codes[0] / 65535 * (high - low), height, rtol=0, atol=3e-5)
+    np.testing.assert_array_equal(codes[1], np.arange(count) % 3)
+    np.testing.assert_array_equal(codes[2], np.arange(count) % 2 == 0)
+    assert not codes[4].any()
+
+
+@pytest.mark.parametrize(
+    ("values", "error", "message"),
+    [
+        ({"a": np.ones(3)}, ValueError, r"values 'a' \(300,\), got shape \(3,\)"),
+        ({"a": np.full(300, np.nan)}, ValueError, "values 'a' must be finite"),
+        ({1: np.ones(300)}, TypeError, "names of values as str"),
+        (np.ones(300), TypeError, "values by their names, as a dict"),
+        ({"a": np.full(300, "x")}, ValueError, "real numbers"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused(values, error, message, tmp_path, unchecked):
+    mesh, made, light, _ = pages.example()
+    with pytest.raises(error, match=message):
+        viewer.export_html(tmp_path / "v.html", made, light, mesh.faces, values=values)
+
+
 def test_words_of_a_user_stay_words(tmp_path):
     mesh, made, light, _ = pages.example()
     title, names = "a </script><b>$knot</b> & more", ["day", "</script><script>alert(1)"]

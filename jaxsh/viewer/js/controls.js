@@ -1,6 +1,7 @@
 // The panel beside the picture: labeled inputs that call back with what they were set to.
 
-const make = (tag, properties = {}, ...children) => {
+// An element with properties and children.
+export const make = (tag, properties = {}, ...children) => {
   const element = Object.assign(document.createElement(tag), properties);
   element.append(...children);
   return element;
@@ -67,8 +68,8 @@ export function choice(label, names, changed) {
 let choices = 0;
 
 // Controls under a heading that folds them away.
-export function group(title, controls, buttons = []) {
-  const element = make("details", { open: true }, make("summary", {}, title));
+export function group(title, controls, buttons = [], open = true) {
+  const element = make("details", { open }, make("summary", {}, title));
   element.append(...controls.map((control) => control.element));
   if (buttons.length) {
     element.append(make("div", { className: "jaxsh-buttons" }, ...buttons.map((one) => one.element)));
@@ -76,12 +77,13 @@ export function group(title, controls, buttons = []) {
   return { element };
 }
 
-export function panelOf(title, groups, hint) {
-  return make(
-    "div",
-    { className: "jaxsh-panel" },
-    make("h1", {}, title),
-    ...groups.map((one) => one.element),
-    make("p", {}, hint),
-  );
+// Pairs of words, as a list.
+export function words(pairs) {
+  return make("dl", {}, ...pairs.map(([term, said]) =>
+    make("div", {}, make("dt", {}, term), make("dd", {}, said))));
+}
+
+export function panelOf(title, groups) {
+  const elements = groups.map((one) => one.element);
+  return make("div", { className: "jaxsh-panel" }, make("h1", {}, title), ...elements);
 }

@@ -1,11 +1,11 @@
 // The panel beside the picture, in groups that fold.
-import { button, choice, group, menu, panelOf, slider, toggle } from "./controls.js";
+import { button, choice, group, menu, panelOf, slider, toggle, words } from "./controls.js";
 import { PARTS } from "./parts.js";
 
 const stops = (x) => `${x < 0 ? "−" : "+"}${Math.abs(x).toFixed(1)} stops`;
 
 // Returns its `element`, and `show(state)`, which moves the controls to where the state is.
-export function makePanel(viewer, hint) {
+export function makePanel(viewer) {
   const { scene } = viewer;
   const lights = lightControls(viewer);
   const picture = [
@@ -14,20 +14,29 @@ export function makePanel(viewer, hint) {
       changed: (x) => viewer.set({ exposure: 2 ** x }),
     }), (state) => Math.log2(state.exposure)),
   ];
+  const looks = ["Its own", "Luminance, in false color", ...scene.values.map(({ name }) => name)];
+  picture.push(
+    bound(menu("Colors", looks, (look) => viewer.chooseLook(look)), (state) => state.look),
+    seenIf((state) => state.look > 0, bound(slider("False color's opacity", {
+      min: 0, max: 1, step: 0.05, value: 1, said: (x) => `${Math.round(100 * x)} %`,
+      changed: (over) => viewer.set({ over }),
+    }), (state) => state.over)),
+  );
   const buttons = [
     bound(toggle("Compare two lights", (compare) => viewer.set({ compare })), (state) => state.compare),
     toggle("Drag turns the light", (on) => (viewer.turns = on)),
     button("Reset", () => viewer.reset()),
     button("Save PNG", () => viewer.save()),
+    button("Copy the view as Python", () => viewer.copy()),
   ];
-  const sides = bound(choice("Side that is changed", ["A", "B"], (i) => viewer.choose(i)), () => viewer.side);
+  const sides = seenIf((state) => state.compare,
+    bound(choice("Side that is changed", ["A", "B"], (i) => viewer.choose(i)), () => viewer.side));
   const groups = [group("Light", [sides, ...lights]), group("Picture", picture, buttons)];
   const show = (state) => {
-    sides.element.hidden = !state.compare;
     [sides, ...lights, ...picture, ...buttons].forEach((control) => control.show?.(state));
   };
   show(viewer.state);
-  return { element: panelOf(scene.title, groups, hint), show };
+  return { element: panelOf(scene.title, [...groups, help()]), show };
 }
 
 function lightControls(viewer) {
@@ -48,5 +57,25 @@ function lightControls(viewer) {
   }
   return [...controls, ...PARTS.flatMap((part) => part.controls?.(viewer) ?? [])];
 }
+
+const HELP = [
+  ["Drag, arrows", "orbit"],
+  ["Shift and these, mirror ball", "turn the light"],
+  ["Wheel, pinch, + and −", "come near"],
+  ["Right button, two fingers", "move"],
+  ["Click, Enter", "transfer of a vertex; Escape closes"],
+  ["C, F", "compare; false color"],
+  ["S, P, R", "save; copy as Python; reset"],
+];
+
+const help = () => group("Mouse, touch and keys", [{ element: words(HELP) }], [], false);
+
+const seenIf = (when, control) => ({
+  ...control,
+  show: (state) => {
+    control.element.hidden = !when(state);
+    control.show(state);
+  },
+});
 
 const bound = (control, read) => ({ ...control, show: (state) => control.set(read(state)) });

@@ -6,5 +6,7 @@
 //   is called whenever the state has changed;
 // - `light(coefficients, state, scene)`: other coefficients, three arrays, of those that shade;
 // - `shade(renderer, coefficients, state, side, scene)`: shades instead of `Renderer.shade`, and
-//   returns true where it did.
+//   returns true where it did;
+// - `turn(turn, state, scene)`: what of the state changes when a drag turns the light, where that is
+//   not its rotation.
 export const PARTS = [];

@@ -36,21 +36,27 @@ void main() {
   gl_Position = camera * vec4(position, 1.0);
 }`;
 
-// The steps of imaging.tone_map(…, curve="clip"): exposed, clipped, encoded as sRGB.
+// The steps of imaging.tone_map(…, curve="clip") after exposure: clipped, encoded as sRGB.
+export const SHOWN_COLOR = `
+vec3 shownColor(vec3 linear) {
+  vec3 x = clamp(linear, 0.0, 1.0);
+  vec3 power = 1.055 * pow(max(x, 0.0031308), vec3(1.0 / 2.4)) - 0.055;
+  return mix(power, 12.92 * x, lessThanEqual(x, vec3(0.0031308)));
+}`;
+
 const SHOW = `#version 300 es
 precision highp float;
 uniform float exposure;
 in vec3 seen;
 out vec4 shown;
+${SHOWN_COLOR}
 void main() {
-  vec3 x = clamp(exposure * seen, 0.0, 1.0);
-  vec3 power = 1.055 * pow(max(x, 0.0031308), vec3(1.0 / 2.4)) - 0.055;
-  shown = vec4(mix(power, 12.92 * x, lessThanEqual(x, vec3(0.0031308))), 1.0);
+  shown = vec4(shownColor(exposure * seen), 1.0);
 }`;
 
 const ALBEDO = 0;
-const POSITION = 0;
-const RADIANCE = 1;
+export const POSITION = 0;
+export const RADIANCE = 1;
 
 export class Renderer {
   // Throws an Error, in words, where WebGL2 or memory is lacking.
@@ -170,22 +176,23 @@ export class Renderer {
     gl.bindVertexArray(null);
   }
 
-  // From space to clip coordinates, by columns; holds what is within `reach` radii of the middle.
-  matrix(camera, [, , width, height], reach = 1) {
-    const { middle, radius } = this.scene;
+  // From space to clip coordinates, by columns; also holds what stands out of the mesh a little.
+  matrix(camera, [, , width, height]) {
+    const { middle } = this.scene;
+    const radius = 1.6 * this.scene.radius;
     const away = minus(middle, camera.position);
     const distance = Math.sqrt(dot(away, away));
-    const far = distance + reach * radius;
-    const near = Math.max(distance - reach * radius, far / 1e4);
+    const far = distance + radius;
+    const near = Math.max(distance - radius, far / 1e4);
     return clipMatrix(camera, width / height, near, far);
   }
 
-  // Linear radiance of a side's vertices, as `shade` left it: three numbers each.
-  colors(side = 0) {
+  // Linear radiance of a side's vertices from `first` on, as `shade` left it: three numbers each.
+  colors(side = 0, first = 0, count = this.scene.positions.length / 3) {
     const { gl } = this;
-    const colors = new Float32Array(this.scene.positions.length);
+    const colors = new Float32Array(3 * count);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.sides[side].radiance);
-    gl.getBufferSubData(gl.ARRAY_BUFFER, 0, colors);
+    gl.getBufferSubData(gl.ARRAY_BUFFER, 12 * first, colors);
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
     return colors;
   }

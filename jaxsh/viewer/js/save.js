@@ -1,15 +1,17 @@
 // Files that the page gives.
 
 // Saves RGBA whose colors are times their alpha, as `pictureOf` reads it, as a PNG that is
-// transparent around the mesh.
-export function saveImage(pixels, width, height) {
+// transparent around the mesh; `draws` may draw over it.
+export function saveImage(pixels, width, height, draws) {
   const picture = Object.assign(document.createElement("canvas"), { width, height });
   for (let i = 0; i < pixels.length; i += 4) {
     const alpha = pixels[i + 3];
     if (alpha === 0 || alpha === 255) continue;
     for (let c = 0; c < 3; c++) pixels[i + c] = (255 * pixels[i + c]) / alpha;
   }
-  picture.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0);
+  const context = picture.getContext("2d");
+  context.putImageData(new ImageData(pixels, width, height), 0, 0);
+  draws(context);
   const link = document.createElement("a");
   link.download = "jaxsh.png";
   link.href = picture.toDataURL("image/png");

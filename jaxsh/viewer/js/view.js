@@ -1,4 +1,5 @@
 // Changes of a camera and of the light's rotation, from distances on the screen.
+import { PARTS } from "./parts.js";
 import { about, axesOf, minus, multiply, orbited, plus } from "./vectors.js";
 
 export const UNTURNED = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
@@ -27,7 +28,9 @@ export class View {
     if (which === "camera") return this.viewer.set({ camera: orbited(camera, across, over) });
     const [right] = axesOf(camera);
     const turn = multiply(about(camera.up, across), about(right, over));
-    return this.viewer.set({ rotation: multiply(turn, rotation) });
+    const { state, scene } = this.viewer;
+    const other = PARTS.map((part) => part.turn?.(turn, state, scene)).find((some) => some);
+    return this.viewer.set(other ?? { rotation: multiply(turn, rotation) });
   }
 
   // Pixels: the camera beside its target and both alike.

@@ -1,17 +1,18 @@
 // A mesh under a light that can be turned, dimmed and cut: its state, and what is drawn of it.
-import { Ball } from "./ball.js";
+import { barHeight, drawBar, shortNumber } from "./color_bar.js";
+import { FalseColor } from "./false_color.js";
 import { pictureOf } from "./gl.js";
 import { rotationBlocks, turned } from "./harmonics.js";
+import { Lobe } from "./lobe.js";
+import { Overlay } from "./overlay.js";
 import { makePanel } from "./panel.js";
 import { PARTS } from "./parts.js";
+import { rayAt, vertexAt } from "./picking.js";
 import { listenToDrags, listenToKeys, listenToWheel } from "./pointer.js";
+import { copied, pythonText } from "./python_text.js";
 import { Renderer } from "./renderer.js";
 import { saveImage } from "./save.js";
 import { UNTURNED, View } from "./view.js";
-
-const HINT = "Drag to orbit; drag the mirror ball, or with Shift, to turn the light; wheel or pinch to "
-  + "come near; drag with the right button or two fingers to move. With the keyboard: arrows, Shift and "
-  + "arrows, + and −.";
 
 export class Viewer {
   // Builds picture and panel in `root`. `scene` is what `unpacked` gives.
@@ -23,25 +24,29 @@ export class Viewer {
     this.canvas = document.createElement("canvas");
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute("role", "img");
-    this.canvas.setAttribute("aria-label", `${scene.title}. ${HINT}`);
+    this.canvas.setAttribute("aria-label", `${scene.title}: arrows orbit, with Shift they turn the light`);
     root.classList.add("jaxsh");
-    this.balls = [new Ball(scene.degree), new Ball(scene.degree)];
+    this.overlay = new Overlay(this);
     this.stage = Object.assign(document.createElement("div"), { className: "jaxsh-stage" });
-    this.stage.append(this.canvas, ...this.balls.map((ball) => ball.canvas));
-    this.panel = makePanel(this, HINT);
-    root.replaceChildren(this.stage, this.panel.element);
+    this.stage.append(this.canvas, ...this.overlay.elements);
+    this.panel = makePanel(this);
+    const body = Object.assign(document.createElement("div"), { className: "jaxsh-body" });
+    body.append(this.stage, this.panel.element);
+    root.replaceChildren(body);
     root.viewer = this;
     this.#listen();
     this.#build();
   }
 
-  // Camera, exposure (a factor on that of the scene), rotation (of the light) and whether two sides
-  // are compared are in common; the other facts of a light are those of a side.
+  // In common are the camera, exposure (a factor on that of the scene), rotation (of the light), whether
+  // two sides are compared, the look (0 color, 1 luminance, 2 and on the values), how opaque that is
+  // over the colors, and the vertex whose transfer is shown. Others are facts of a side's light.
   reset() {
     const { camera, degree } = this.scene;
     const parts = PARTS.map((part) => part.start?.(this.scene) ?? {});
     const light = Object.assign({ degree, index: 0, intensity: 1 }, ...parts);
-    this.shared = { camera, exposure: 1, rotation: UNTURNED, compare: false };
+    const shared = { camera, exposure: 1, rotation: UNTURNED, compare: false };
+    this.shared = { ...shared, look: 0, over: 1, vertex: null };
     this.sides = [light, light];
     this.side = 0; // the one that the panel shows and changes
     if (this.panel) this.set({});
@@ -69,6 +74,11 @@ export class Viewer {
     }
     this.panel.show(this.state);
     this.#draw(shades);
+  }
+
+  // Chooses a look; levels let the picture shine through.
+  chooseLook(look) {
+    this.set({ look, over: this.scene.values[look - 2]?.labels ? 0.7 : 1 });
   }
 
   // Chooses the side that the panel changes.
@@ -106,15 +116,77 @@ export class Viewer {
     return pictureOf(this.renderer.gl, width, height, samples, () => this.#paint(width, height));
   }
 
-  // Width and height of one view, in pixels of the page.
-  extent() {
+  // Left, top, width and height of a side on the canvas, in pixels of the page.
+  rectangle(side = this.side) {
     const { clientWidth, clientHeight } = this.canvas;
-    return this.#rectangles(clientWidth, clientHeight)[0].slice(2);
+    const [left, bottom, width, height] = this.#rectangles(clientWidth, clientHeight)[side];
+    return [left, clientHeight - bottom - height, width, height];
   }
 
+  extent() {
+    return this.rectangle(0).slice(2);
+  }
+
+  // What the colors stand for, for `drawBar`; null where they are the picture's own.
+  barFacts() {
+    const { look, exposure } = this.shared;
+    if (look === 0) return null;
+    const high = 1 / (exposure * this.scene.exposure);
+    if (look === 1) return { title: "Luminance, in the light's unit", low: 0, high, under: true, over: true };
+    const { name: title, labels, low, high: most } = this.scene.values[look - 2];
+    return { title, labels, low, high: most };
+  }
+
+  // One of the scene's values at a vertex, in words.
+  valueOf({ array, labels, low, high }, vertex) {
+    const code = this.scene[array][vertex];
+    return labels ? labels[code] : shortNumber(low + (code / 65535) * (high - low));
+  }
+
+  // Linear radiance of one vertex as it was last shaded.
+  radianceOf(vertex) {
+    return this.renderer.colors(this.side, vertex, 1);
+  }
+
+  // A PNG that is transparent beside the mesh; in false color with the bar.
   save() {
     const { width, height } = this.canvas;
-    saveImage(this.pixels(width, height, 4), width, height);
+    const facts = this.barFacts();
+    const scale = width / this.canvas.clientWidth;
+    saveImage(this.pixels(width, height, 4), width, height, (context) => {
+      if (!facts) return;
+      context.scale(scale, scale);
+      context.translate(12, height / scale - barHeight(facts) - 12);
+      drawBar(context, facts, "black", "rgb(255 255 255 / 0.85)");
+    });
+  }
+
+  // Python of the view.
+  python() {
+    const { width, height } = this.canvas;
+    const [, , ...size] = this.#rectangles(width, height)[0];
+    return pythonText(this.state, this.state.exposure * this.scene.exposure, ...size);
+  }
+
+  async copy() {
+    const done = await copied(this.python());
+    this.overlay.say(done ? "Copied as Python" : "This browser does not let the page copy");
+  }
+
+  // Shows the transfer of the vertex under a place of the page, or that in the middle.
+  pick(x, y) {
+    const [left, top, width, height] = this.#sideAt(x, y);
+    const place = [(2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height];
+    const ray = rayAt(this.shared.camera, x === undefined ? [0, 0] : place, width / height);
+    const vertex = vertexAt(this.scene, ray);
+    if (vertex === null && x === undefined) this.overlay.say("No vertex in the middle");
+    this.set({ vertex });
+  }
+
+  #sideAt(x, y) {
+    const holds = ([left, top, width, height]) =>
+      x >= left && x < left + width && y >= top && y < top + height;
+    return this.#shown().map((side) => this.rectangle(side)).find(holds) ?? this.rectangle(0);
   }
 
   release() {
@@ -157,6 +229,7 @@ export class Viewer {
       }));
       return;
     }
+    [this.falseColor, this.lobe] = [null, null]; // made when first shown
     this.#draw(true);
   }
 
@@ -170,7 +243,7 @@ export class Viewer {
       if (this.shades) this.#shown().forEach((side) => this.#shade(side));
       this.shades = false;
       this.#paint(this.canvas.width, this.canvas.height);
-      this.#lay();
+      this.overlay.show();
     });
   }
 
@@ -182,23 +255,19 @@ export class Viewer {
   }
 
   #paint(width, height) {
-    const { camera, exposure } = this.shared;
-    this.renderer.clear(width, height);
+    const { renderer } = this;
+    const { camera, exposure, look, over, vertex } = this.shared;
+    let used;
+    if (look > 0) {
+      this.falseColor ??= new FalseColor(renderer);
+      used = this.falseColor.use(look - 2, over);
+    }
+    renderer.clear(width, height);
     this.#rectangles(width, height).forEach((rectangle, side) => {
-      this.renderer.draw(camera, exposure * this.scene.exposure, rectangle, side);
-    });
-  }
-
-  // What stands over the picture.
-  #lay() {
-    const { camera, exposure, compare } = this.shared;
-    const { clientWidth, clientHeight } = this.canvas;
-    this.stage.classList.toggle("jaxsh-two", compare);
-    this.balls[1].canvas.hidden = !compare;
-    this.#rectangles(clientWidth, clientHeight).forEach(([left, bottom, , height], side) => {
-      const { canvas } = this.balls[side];
-      canvas.style.translate = `${left}px ${clientHeight - bottom - height}px`;
-      this.balls[side].draw(this.light(side), camera, exposure * this.scene.exposure);
+      renderer.draw(camera, exposure * this.scene.exposure, rectangle, side, used);
+      if (vertex === null) return;
+      this.lobe ??= new Lobe(renderer);
+      this.lobe.draw(vertex, this.stateOf(side).degree, camera, rectangle);
     });
   }
 
@@ -206,10 +275,19 @@ export class Viewer {
     const { canvas } = this;
     const view = new View(this);
     const which = (event) => (event.shiftKey || this.turns ? "light" : "camera");
-    listenToDrags(canvas, view, which);
-    this.balls.forEach((ball) => listenToDrags(ball.canvas, view, () => "light"));
+    listenToDrags(canvas, view, which, ({ offsetX, offsetY }) => this.pick(offsetX, offsetY));
+    this.overlay.balls.forEach((ball) => listenToDrags(ball.canvas, view, () => "light"));
     listenToWheel(canvas, view);
-    listenToKeys(canvas, view, which, {});
+    const looks = this.scene.values.length + 2;
+    listenToKeys(canvas, view, which, {
+      Enter: () => this.pick(),
+      Escape: () => this.set({ vertex: null }),
+      c: () => this.set({ compare: !this.shared.compare }),
+      f: () => this.chooseLook((this.shared.look + 1) % looks),
+      p: () => this.copy(),
+      r: () => this.reset(),
+      s: () => this.save(),
+    });
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => !this.released && this.#build());
     this.observer = new ResizeObserver(() => {
