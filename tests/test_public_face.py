@@ -44,6 +44,7 @@ REASONS = {
         "studio": NO_ARRAYS,
         "write_image": NO_ARRAYS,
         "write_light": HOST,
+        "write_movie": NO_ARRAYS,
         "write_splats": HOST,
     },
     "inverse": {"light_variances": NO_ARRAYS},

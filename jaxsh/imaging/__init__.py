@@ -10,6 +10,7 @@ from ._camera import Camera
 from ._display import auto_exposure, psnr, srgb_decode, srgb_encode, tone_map
 from ._environment import read_environment, studio
 from ._light import read_light, write_light
+from ._movie import write_movie
 from ._raster import Raster, interpolate, rasterize
 from ._splats import Splats, read_splats, write_splats
 from ._write import write_image
@@ -33,5 +34,6 @@ __all__ = [
     "tone_map",
     "write_image",
     "write_light",
+    "write_movie",
     "write_splats",
 ]

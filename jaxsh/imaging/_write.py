@@ -45,7 +45,7 @@ def write_image(
     ...     imaging.write_image(pathlib.Path(folder) / "a" / "probe.png", image).name
     'probe.png'
     """
-    path, pixels = as_path(path), _array(image)
+    path, pixels = as_path(path), as_numbers(image)
     suffix = path.suffix.lower()
     if suffix not in _DISPLAY + _LINEAR:
         raise ValueError(f"{path}: cannot write {suffix}, only {_DISPLAY + _LINEAR}")
@@ -60,19 +60,20 @@ def write_image(
             f"channels one of {channels}, got shape {np.shape(image)}{hint}"
         )
     try:
-        pixels = _signal(pixels, encoding) if suffix in _DISPLAY else _light(pixels, encoding)
+        pixels = as_signal(pixels, encoding) if suffix in _DISPLAY else _light(pixels, encoding)
         if suffix == ".hdr":
             pixels = _for_hdr(pixels)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    if suffix in (".jpg", ".jpeg") and pixels.dtype == np.uint16:
-        pixels = np.rint(pixels / 257).astype(np.uint8)
+    if suffix in (".jpg", ".jpeg"):
+        pixels = in_8_bits(pixels)
     path.parent.mkdir(parents=True, exist_ok=True)
     _write(path, np.ascontiguousarray(pixels))
     return path
 
 
-def _array(image: object) -> np.ndarray:
+def as_numbers(image: object) -> np.ndarray:
+    """Convert to an array of numbers; raises `ValueError` for anything else."""
     try:
         array = np.asarray(image)
     except (TypeError, ValueError):  # lists of several lengths
@@ -82,11 +83,16 @@ def _array(image: object) -> np.ndarray:
     return array
 
 
-def _signal(pixels: np.ndarray, encoding: str | None) -> np.ndarray:
+def as_signal(pixels: np.ndarray, encoding: str | None) -> np.ndarray:
     """Round what a screen shows to 8 bits; what came in 8 or 16 stays."""
     if _is_coded(pixels, encoding):
         return pixels
     return np.rint(np.clip(_finite(pixels), 0, 1) * 255).astype(np.uint8)
+
+
+def in_8_bits(signal: np.ndarray) -> np.ndarray:
+    """Round codes of 16 bits to 8."""
+    return signal if signal.dtype == np.uint8 else np.rint(signal / 257).astype(np.uint8)
 
 
 def _light(pixels: np.ndarray, encoding: str | None) -> np.ndarray:

@@ -1,7 +1,4 @@
-"""The sun by the Astronomical Almanac's short formula, beside which `sky.sun_direction` is held.
-
-Twelve lines without an angle of the horizon: the viewer's pages evaluate the same.
-"""
+"""The sun by the Astronomical Almanac's short formula, beside which `sky.sun_direction` is held."""
 
 import numpy as np
 

@@ -99,6 +99,17 @@ def calls():
             finite="light",
             slow=True,
         ),
+        "write_movie": of(
+            i.write_movie,
+            path="/dev/null/no/a.gif",
+            frames=floats(1, 6, 8, 3),
+            fps=25.0,
+            loop=True,
+            quality=80.0,
+            encoding=None,
+            finite="frames fps quality",
+            slow=True,
+        ),
         "write_splats": of(
             i.write_splats,
             path="/dev/null/no/a.ply",
