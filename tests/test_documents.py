@@ -1,4 +1,4 @@
-"""What a newcomer would run first: the blocks of each page and the notebooks, each from scratch."""
+"""What a newcomer would run first: the blocks of each page, from scratch."""
 
 import os
 import re
@@ -6,14 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import nbclient
-import nbformat
 import numpy as np
 import pytest
 from matplotlib import pyplot
 
 ROOT = Path(__file__).parent.parent
-NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -57,20 +54,3 @@ def test_blocks_run_in_order(page, tmp_path):
         assert shown.shape[0] >= 256
         assert 0.1 < shown.mean() < 0.9
         assert np.ptp(shown.reshape(-1, 3), axis=0).min() > 0.5
-
-
-@pytest.mark.parametrize("path", default_run(NOTEBOOKS, {"02_light_a_mesh"}))
-def test_notebook(path):
-    notebook = nbformat.read(path, as_version=4)
-    # Raises with the cell and its error where one fails.
-    client = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": ROOT}})
-    # Without the tests' backend, so that the kernel shows its figures.
-    client.execute(env={name: value for name, value in os.environ.items() if name != "MPLBACKEND"})
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
-    assert any("image/png" in output.get("data", {}) for output in outputs)
-    warned = [output["text"] for output in outputs if output.get("name") == "stderr"]
-    assert not warned
-
-
-def test_there_are_notebooks():
-    assert NOTEBOOKS
