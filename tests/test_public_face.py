@@ -49,7 +49,20 @@ REASONS = {
     },
     "inverse": {"light_variances": NO_ARRAYS},
     "midrange": {"grid_around": ONE, "place_samples": HOST, "update_samples": HOST},
-    "plot": dict.fromkeys(["bands", "light", "lobes"], HOST),
+    "plot": dict.fromkeys(
+        [
+            "ball",
+            "balloon",
+            "bands",
+            "basis",
+            "coefficients",
+            "light",
+            "lobes",
+            "shaded",
+            "vertices",
+        ],
+        HOST,
+    ),
     "sky": {
         "c_header": NO_ARRAYS,
         "habel2008_evaluate": HOST,

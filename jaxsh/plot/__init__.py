@@ -5,8 +5,23 @@ figure nor chooses a backend. Arrays may be JAX's or NumPy's; their values are r
 here works inside `jit`, and nothing differentiates.
 """
 
+from ._ball import ball
 from ._bands import bands
+from ._basis import basis
+from ._coefficients import coefficients
 from ._light import light
-from ._lobes import lobes
+from ._lobes import balloon, lobes
+from ._shaded import shaded
+from ._vertices import vertices
 
-__all__ = ["bands", "light", "lobes"]
+__all__ = [
+    "ball",
+    "balloon",
+    "bands",
+    "basis",
+    "coefficients",
+    "light",
+    "lobes",
+    "shaded",
+    "vertices",
+]

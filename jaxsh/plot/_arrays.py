@@ -1,19 +1,15 @@
 """Argument checks: what is drawn is read to the host, and must be finite."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
-from matplotlib.axes import Axes
 
-from .._core.checks import as_host_float, check_all, check_coefficients, check_type
-
-POSITIVE = "#e07b39"
-NEGATIVE = "#3b7dd8"
-CHANNELS = ("#d62728", "#2ca02c", "#1f77b4")  # R, G, B in matplotlib's own hues
+from .._core.checks import as_host_float, check_all, check_coefficients
 
 
-def read(name: str, values: ArrayLike) -> Float[np.ndarray, "..."]:
+def read(name: str, values: Any) -> Float[np.ndarray, "..."]:
     """The values as a host array; raises `ValueError` where they are not finite real numbers."""
     array = as_host_float(values, name)
     array = array.astype(array.dtype if array.dtype in (np.float32, np.float64) else np.float32)
@@ -32,15 +28,12 @@ def check_labels(name: str, labels: Sequence[str] | None, count: int) -> None:
         raise ValueError(f"expected {count} {name}, one per function, got {len(labels)}")
 
 
-def check_axes(ax: Axes | None) -> None:
-    if ax is not None:
-        check_type("ax", ax, Axes)
-
-
-def read_coefficients(coefficients: ArrayLike) -> Float[np.ndarray, "..."]:
+def read_coefficients(
+    coefficients: ArrayLike, name: str = "coefficients"
+) -> Float[np.ndarray, "..."]:
     """The coefficients as a host array, at least (K,), with K a square."""
-    array = read("coefficients", coefficients)
-    check_coefficients("coefficients", array)
+    array = read(name, coefficients)
+    check_coefficients(name, array)
     if array.size == 0:
-        raise ValueError(f"there is no function to draw in coefficients of shape {array.shape}")
+        raise ValueError(f"there is no function to draw in {name} of shape {array.shape}")
     return array

@@ -4,16 +4,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
-from matplotlib.patches import Patch
 
 from .._core.checks import check_number, check_size
-from .._core.pictures import as_picture
 from ..imaging import auto_exposure, tone_map
 from ..sphere import reconstruct_lat_long
-from ._arrays import check_axes, read, read_coefficients
-
-_MARK = "#ff00ff"
-_ROUNDING = 1e-6  # of the largest radiance: negative light below this is rounding
+from ._axes import flat_axes
+from ._negative import mark_negative
+from ._radiance import read_light
 
 
 def light(
@@ -53,7 +50,7 @@ def light(
     >>> ax.get_legend().get_texts()[0].get_text()
     'negative: 40 % of the sphere, down to −1.2'
     """
-    check_axes(ax)
+    ax = None if ax is None else flat_axes(ax, (7.0, 4.0))
     height = check_size("height", height)
     if exposure is not None:
         exposure = check_number("exposure", exposure, least=0.0)
@@ -62,10 +59,7 @@ def light(
     if exposure is None:
         exposure = float(auto_exposure(shown))
     encoded = np.asarray(tone_map(shown, exposure))
-    if ax is None:
-        from matplotlib import pyplot
-
-        _, ax = pyplot.subplots(figsize=(7, 4), layout="constrained")
+    ax = flat_axes(ax, (7.0, 4.0))
     ax.imshow(
         np.broadcast_to(encoded, (*encoded.shape[:2], 3)),
         extent=(0, 360, 180, 0),
@@ -81,39 +75,21 @@ def light(
 
 
 def _picture(light: ArrayLike, height: int) -> Float[np.ndarray, "h w c"]:
-    values = read("light", light)
+    values = read_light(light)
     if values.ndim == 3:
-        as_picture("light", light, lat_long=True)
-    if values.ndim == 3 and values.shape[-1] in (1, 3) and values.size:
         return values
-    if values.ndim == 1 or (values.ndim == 2 and values.shape[0] in (1, 3)):
-        coefficients = np.atleast_2d(read_coefficients(values))
-        return np.asarray(reconstruct_lat_long(jnp.asarray(coefficients), height, 2 * height))
-    raise ValueError(
-        "expected coefficients (K,), (1, K) or (3, K), or a lat-long picture (height, width, "
-        f"1 or 3), got shape {values.shape}"
-    )
+    return np.asarray(reconstruct_lat_long(jnp.asarray(values), height, 2 * height))
 
 
 def _mark_negative(ax: Axes, picture: Float[np.ndarray, "h w c"]) -> None:
     lowest = picture.min(axis=-1)
-    if not lowest.min() < -_ROUNDING * abs(picture).max():
-        return
     rows, columns = lowest.shape
     phi = (np.arange(-1, columns + 1) + 0.5) * 360 / columns
     theta = np.concatenate([[0], (np.arange(rows) + 0.5) * 180 / rows, [180]])
     # One pixel more on each side, so that the outline reaches the picture's edges.
     around = np.pad(np.pad(lowest, ((1, 1), (0, 0)), mode="edge"), ((0, 0), (1, 1)), mode="wrap")
-    hatched = ax.contourf(
-        phi, theta, around, levels=[float(lowest.min()) * 1.01, 0.0], colors="none", hatches=["///"]
-    )
-    hatched.set(edgecolor=_MARK, linewidth=0.0)
-    ax.contour(phi, theta, around, levels=[0.0], colors=_MARK, linewidths=1.2)
-    ax.set(xlim=(0, 360), ylim=(180, 0))
     bounds = np.cos(np.linspace(0, np.pi, rows + 1))
     share = ((lowest < 0).mean(axis=1) * (bounds[:-1] - bounds[1:])).sum() / 2
-    text = f"negative: {100 * share:.2g} % of the sphere, down to −{-lowest.min():.2g}"
-    patch = Patch(facecolor="none", edgecolor=_MARK, hatch="///", label=text)
-    ax.legend(
-        handles=[patch], loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, fontsize=9
-    )
+    said = f"{100 * share:.2g} % of the sphere"
+    mark_negative(ax, phi, theta, around, float(abs(picture).max()), said, below=48.0)
+    ax.set(xlim=(0, 360), ylim=(180, 0))

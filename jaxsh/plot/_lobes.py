@@ -1,19 +1,22 @@
-"""Functions on the sphere as balloons."""
+"""Functions on the sphere as balloons, one by one."""
 
-import math
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 
-from .._core.checks import check_flag, check_size
-from ..harmonics import degree_of, evaluate
-from ._arrays import NEGATIVE, POSITIVE, check_labels, read_coefficients
+from .._core import srgb
+from .._core.checks import check_flag, check_size, check_type
+from ..harmonics import degree_of
+from ._arrays import check_labels, read_coefficients
+from ._axes import flat_axes, panels
+from ._balloon import balloons, draw_balloon, sign_colors, steps_for
+from ._colors import MARK, luminance
+from ._disc import Toward, frame
 
-_VIEW = {"elev": 22.0, "azim": 35.0}
+_TOWARD = (0.5, -1.0, 0.5)
 
 
 def lobes(
@@ -21,30 +24,33 @@ def lobes(
     *,
     titles: Sequence[str] | None = None,
     same_scale: bool = True,
-    resolution: int | None = None,
+    unit: str = "",
+    toward: Toward = _TOWARD,
+    resolution: int = 256,
     ax: Axes | Sequence[Axes] | np.ndarray | None = None,
 ) -> np.ndarray:
     """Draw functions on the sphere as balloons: the radius is |f|, the color tells the sign.
 
-    Orange is positive, blue negative; z points up, and short lines mark +x, +y, +z. Each function
-    has a panel of its own.
+    Orange is positive, blue negative; lines mark +x, +y, +z, and a bar below says what radius means
+    what value. Each function has a panel of its own; functions are laid out in a row up to four,
+    and above in a grid near a square.
 
     **Arguments**
 
-    - `coefficients`: (..., K), jax or numpy. (rows, columns, K) keeps its grid of panels; other
-      functions are laid out in a row up to four, and above in a grid near a square.
+    - `coefficients`: (..., K), jax or numpy. (rows, columns, K) keeps its grid of panels.
     - `titles`: a title per panel.
     - `same_scale`: whether one radius means the same value in all panels; otherwise each balloon
       fills its own.
-    - `resolution`: steps from pole to pole; by default 6 for each degree, at least 48.
-    - `ax`: three-dimensional axes (`projection="3d"`), as many as functions; by default those of a
-      new figure.
+    - `unit`: of f, after the number at the bar.
+    - `toward`: from the balloons to who looks at them, from far away, z upwards.
+    - `resolution`: pixels across a panel.
+    - `ax`: axes, as many as functions; by default those of a new figure.
 
     **Returns**
 
-    The axes, a one-dimensional array with one per function. Raises `ValueError` for a K that is not
-    a square, values that are not finite, axes that are flat or not as many as functions, and titles
-    that are not as many.
+    The axes, a one-dimensional array with one per function. Runs on the host. Raises `ValueError`
+    for a K that is not a square, values that are not finite, axes or titles that are not as many as
+    functions, and a `toward` that is no direction.
 
     **Example**
 
@@ -58,71 +64,75 @@ def lobes(
     functions = values.reshape(-1, values.shape[-1])
     check_labels("titles", titles, len(functions))
     same_scale = check_flag("same_scale", same_scale)
-    if resolution is not None:
-        resolution = check_size("resolution", resolution)
-    axes = _axes(ax, values.shape[:-1])
-    steps = resolution or max(48, 6 * degree_of(values.shape[-1]))
-    theta, phi = np.meshgrid(
-        np.linspace(0, np.pi, steps + 1), np.linspace(0, 2 * np.pi, 2 * steps + 1), indexing="ij"
-    )
-    directions = np.stack(
-        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
-    )
-    directions = directions.astype(functions.dtype)
-    basis = np.asarray(evaluate(jnp.asarray(directions), degree_of(values.shape[-1])))
-    radii = np.einsum("...k,nk->n...", basis, functions)
-    largest = abs(radii).max(axis=(1, 2))
+    check_type("unit", unit, str)
+    viewer = frame(toward)
+    resolution = check_size("resolution", resolution)
+    axes = panels(ax, values.shape[:-1], (2.6, 3.1))
+    shapes = balloons(functions, steps_for(degree_of(values.shape[-1])))
+    largest = abs(shapes.values).max(axis=1)
     if same_scale:
         largest = np.broadcast_to(largest.max(), largest.shape)
-    for number, (panel, radius) in enumerate(zip(axes, radii, strict=True)):
-        _draw(panel, directions, radius / (largest[number] or 1))
+    for number, panel in enumerate(axes):
+        one = shapes.mesh(number, 1 / (float(largest[number]) or 1))
+        colors = sign_colors(shapes.values[number])
+        draw_balloon(panel, one, colors, viewer, resolution, float(largest[number]), "|f| = ", unit)
         if titles is not None:
-            panel.set_title(titles[number], fontsize=10)
+            panel.set_title(titles[number])
     return axes
 
 
-def _axes(ax, shape: tuple[int, ...]) -> np.ndarray:
-    count = math.prod(shape)
-    if ax is None:
-        from matplotlib import pyplot
+def balloon(
+    light: Float[ArrayLike, "*c k"],
+    *,
+    unit: str = "",
+    toward: Toward = _TOWARD,
+    resolution: int = 384,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw a light as one balloon: the radius is the luminance, the color the light's own.
 
-        square = count if count <= 4 else math.ceil(math.sqrt(count))
-        columns = shape[1] if len(shape) == 2 else square
-        rows = math.ceil(count / columns)
-        figure, grid = pyplot.subplots(
-            rows,
-            columns,
-            figsize=(2.2 * columns, 2.2 * rows),
-            squeeze=False,
-            layout="constrained",
-            subplot_kw={"projection": "3d"},
-        )
-        for unused in grid.ravel()[count:]:
-            figure.delaxes(unused)
-        return grid.ravel()[:count]
-    axes = np.array([ax] if isinstance(ax, Axes) else list(np.ravel(np.asarray(ax, object))))
-    if len(axes) != count:
-        raise ValueError(f"expected {count} axes, one per function, got {len(axes)}")
-    if any(getattr(one, "name", None) != "3d" for one in axes):
-        raise ValueError('balloons need axes made with projection="3d", got flat ones')
-    return axes
+    Colors have their largest channel at full, since the radius tells how bright the light is.
+    Where luminance is negative the balloon is magenta. Lines mark +x, +y, +z, and a bar below says
+    what radius means what luminance.
 
+    **Arguments**
 
-def _draw(ax, directions: Float[np.ndarray, "t p 3"], radius: Float[np.ndarray, "t p"]) -> None:
-    x, y, z = np.moveaxis(directions * abs(radius)[..., None], -1, 0)
-    # A face has one color: that of the function at its middle.
-    middle = (radius[:-1, :-1] + radius[1:, :-1] + radius[:-1, 1:] + radius[1:, 1:]) / 4
-    colors = np.where((middle >= 0)[..., None], to_rgb(POSITIVE), to_rgb(NEGATIVE))
-    ax.plot_surface(
-        x, y, z, facecolors=colors, rcount=len(x), ccount=x.shape[1], linewidth=0, antialiased=False
-    )
-    for axis, name in enumerate("xyz"):
-        line = np.zeros((3, 2))
-        line[axis] = 0, 1.15
-        ax.plot(*line, color="0.6", linewidth=0.7, zorder=0)
-        ax.text(*(1.25 * np.eye(3)[axis]), name, color="0.4", fontsize=7, ha="center", va="center")
-    ax.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
-    ax.set_proj_type("ortho")
-    ax.set_box_aspect((1, 1, 1), zoom=1.45)
-    ax.view_init(**_VIEW)
-    ax.set_axis_off()
+    - `light`: coefficients (3, K), linear sRGB; or (K,) or (1, K), which give a gray balloon. jax
+      or numpy.
+    - `unit`: of luminance, after the number at the bar.
+    - `toward`: from the balloon to who looks at it, from far away, z upwards.
+    - `resolution`: pixels across the picture.
+    - `ax`: axes to draw on; by default those of a new figure.
+
+    **Returns**
+
+    The axes, in radii of the largest luminance. Runs on the host. Raises `ValueError` for another
+    shape, values that are not finite, and a `toward` that is no direction.
+
+    **Example**
+
+    >>> from jaxsh import imaging, plot, sphere
+    >>> light = sphere.project_lat_long(imaging.studio(16, 32), 2)
+    >>> ax = plot.balloon(light, resolution=16)
+    >>> [text.get_text() for text in ax.texts][:3]
+    ['+x', '+y', '+z']
+    """
+    values = np.atleast_2d(read_coefficients(light, "light"))
+    if values.ndim != 2 or len(values) not in (1, 3):
+        raise ValueError(f"expected light (K,), (1, K) or (3, K), got shape {values.shape}")
+    check_type("unit", unit, str)
+    viewer = frame(toward)
+    resolution = check_size("resolution", resolution)
+    ax = flat_axes(ax, (4.0, 4.5))
+    gray = luminance(values.T)
+    shapes = balloons(np.concatenate([gray[None], values]), steps_for(degree_of(len(gray))))
+    seen = shapes.values[1:].T
+    brightest = seen.max(axis=1, keepdims=True)
+    own = np.clip(seen / np.where(brightest > 0, brightest, 1), 0, 1)
+    mark = srgb.decode(np.array(to_rgb(MARK)))
+    colors = np.where(shapes.values[0][:, None] >= 0, own, mark)
+    largest = float(abs(shapes.values[0]).max())
+    one = shapes.mesh(0, 1 / (largest or 1))
+    colors = np.broadcast_to(colors, (len(seen), 3))
+    draw_balloon(ax, one, colors, viewer, resolution, largest, "luminance = ", unit)
+    return ax

@@ -7,43 +7,13 @@ import jax.numpy as jnp
 import matplotlib
 import numpy as np
 import pytest
+from drawn import at, near, pixels
 from matplotlib import pyplot
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from jaxsh import harmonics, imaging, plot, sphere
 
-ORANGE, BLUE, MAGENTA = (224, 123, 57), (59, 125, 216), (255, 0, 255)
-
-
-@pytest.fixture(autouse=True)
-def no_figure_stays():
-    yield
-    pyplot.close("all")
-
-
-def pixels(figure) -> np.ndarray:
-    """What the figure looks like, (height, width, 3) in 0..255."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
-
-
-def at(ax, points) -> np.ndarray:
-    """The colors of the pixels that show points given in data coordinates."""
-    image = pixels(ax.figure)
-    x, y = ax.transData.transform(points).T
-    return image[len(image) - 1 - y.astype(int), x.astype(int)]
-
-
-def near(image, color, tolerance=40) -> np.ndarray:
-    return (abs(image - np.array(color)) <= tolerance).all(axis=-1)
-
-
-def hue(image, color) -> np.ndarray:
-    """Pixels of the color in any shade: a balloon is lit from one side."""
-    unit = image / np.maximum(np.linalg.norm(image, axis=-1, keepdims=True), 1)
-    return unit @ (np.array(color) / np.linalg.norm(color)) > 0.995
+MAGENTA = (255, 0, 255)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -108,7 +78,7 @@ def test_light_tells_one_negative_channel_and_ignores_rounding():
     ("light", "message"),
     [
         (np.zeros((3, 5)), r"1, 4, 9"),
-        (np.zeros((2, 9)), r"expected coefficients .* got shape \(2, 9\)"),
+        (np.zeros((2, 9)), r"expected light as coefficients .* got shape \(2, 9\)"),
         (np.zeros((4, 3, 9)), r"got shape \(4, 3, 9\)"),
         (np.array([np.nan, 0, 0, 1]), "light must be finite, got 1 of 4"),
         (np.ones((8, 16, 3), complex), "expected real numbers for light, got .* dtype complex128"),
@@ -122,60 +92,6 @@ def test_light_refuses(light, message, unchecked):
         plot.light(light)
 
 
-def test_lobes_stand_where_the_function_is_large():
-    ((up, down),) = [plot.lobes(np.array([[0, 0, 1.0, 0], [0, 0, -1.0, 0]]), resolution=20)]
-    image = pixels(up.figure)
-    for ax, above, below in ((up, ORANGE, BLUE), (down, BLUE, ORANGE)):
-        left, right = (int(x) for x in ax.get_window_extent().intervalx)
-        panel = image[:, left:right]
-        rows = [np.argwhere(hue(panel, color))[:, 0] for color in (above, below)]
-        assert len(rows[0]) > 500
-        assert rows[0].mean() < rows[1].mean()
-        # The two balls of y_10 are mirror images: seen without perspective, equally large.
-        assert len(rows[0]) == pytest.approx(len(rows[1]), rel=0.1)
-
-
-def test_lobes_scale_with_the_function():
-    # A constant is a ball: its silhouette a disc, with the radius |f| as a share of the largest.
-    both = np.array([[1.0], [0.5]])
-    for same, ratio in ((True, 0.5), (False, 1.0)):
-        axes = plot.lobes(both, same_scale=same, resolution=20)
-        image = pixels(axes[0].figure)
-        sizes = []
-        for ax in axes:
-            left, right = (int(x) for x in ax.get_window_extent().intervalx)
-            ball = np.argwhere(hue(image[:, left:right], ORANGE))
-            height, width = np.ptp(ball, axis=0) + 1
-            assert height == pytest.approx(width, rel=0.06)
-            assert len(ball) == pytest.approx(np.pi / 4 * height * width, rel=0.06)
-            sizes.append(width)
-        assert sizes[1] / sizes[0] == pytest.approx(ratio, rel=0.06)
-
-
-def test_lobes_keep_a_grid_and_take_axes():
-    assert plot.lobes(np.eye(4), resolution=4).shape == (4,)
-    grid = plot.lobes(jnp.eye(4).reshape(2, 2, 4), titles="abcd", resolution=4)
-    assert [ax.get_title() for ax in grid] == list("abcd")
-    figure = Figure()
-    own = figure.add_subplot(projection="3d")
-    assert plot.lobes(np.array([1.0]), ax=own, resolution=4)[0] is own
-    before = pyplot.get_fignums()
-    axes = Figure().subplots(1, 2, subplot_kw={"projection": "3d"})
-    assert list(plot.lobes(np.ones((2, 1)), ax=axes, resolution=4)) == list(axes)
-    assert pyplot.get_fignums() == before
-
-
-def test_lobes_refuse():
-    with pytest.raises(ValueError, match="expected 2 axes, one per function, got 1"):
-        plot.lobes(np.ones((2, 1)), ax=Figure().add_subplot(projection="3d"))
-    with pytest.raises(ValueError, match='projection="3d"'):
-        plot.lobes(np.ones(1), ax=Figure().add_subplot())
-    with pytest.raises(ValueError, match="expected 1 titles, one per function, got 2"):
-        plot.lobes(np.ones(1), titles=["a", "b"])
-    with pytest.raises(ValueError, match="no function to draw"):
-        plot.lobes(np.ones((0, 4)))
-
-
 @pytest.mark.parametrize("array", [np.asarray, jnp.asarray])
 def test_bands_are_the_power_of_each_degree(rng, array):
     light = rng.normal(size=(3, 16))
@@ -187,7 +103,7 @@ def test_bands_are_the_power_of_each_degree(rng, array):
     integral = np.asarray(quadrature.weights) @ values**2
     np.testing.assert_allclose(np.sum(lines, axis=1), integral, rtol=1e-12)
     assert ax.get_yscale() == "log"
-    for line, color in zip(lines, ("#d62728", "#2ca02c", "#1f77b4"), strict=True):
+    for line, color in zip(lines, ("#d55e00", "#009e73", "#0072b2"), strict=True):
         shown = at(ax, np.stack([np.arange(4), line], axis=-1))
         expected = 255 * np.array(matplotlib.colors.to_rgb(color))
         assert near(shown, expected).sum() >= 3  # a marker of another line may lie on one
@@ -201,6 +117,14 @@ def test_bands_leave_out_degrees_without_power():
         plot.bands(np.ones(4), labels=["a", "b"])
 
 
+def test_bands_name_the_channels_of_a_light():
+    ax = plot.bands(np.eye(4)[:3], unit="(cd/m²)² sr")
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["R", "G", "B"]
+    assert len({line.get_marker() for line in ax.get_lines()}) == 3  # not by color alone
+    assert ax.get_ylabel() == "power Σₘ cₗₘ², in (cd/m²)² sr"
+    assert plot.bands(np.eye(4)[:2]).get_legend() is None
+
+
 def test_nothing_is_shown_and_no_backend_chosen(monkeypatch):
     def refuse(*_, **__):
         raise AssertionError("a plot is the caller's to show")
@@ -209,10 +133,10 @@ def test_nothing_is_shown_and_no_backend_chosen(monkeypatch):
     monkeypatch.setattr(matplotlib, "use", refuse)
     monkeypatch.setattr(pyplot, "switch_backend", refuse)
     before = pyplot.get_fignums()
-    flat, solid = Figure().add_subplot(), Figure().add_subplot(projection="3d")
+    flat, other = Figure().add_subplot(), Figure().add_subplot()
     assert plot.light(np.ones(4), ax=flat) is flat
     assert plot.bands(np.ones(4), ax=flat) is flat
-    assert plot.lobes(np.ones(4), ax=solid, resolution=4)[0] is solid
+    assert plot.lobes(np.ones(4), ax=other, resolution=4)[0] is other
     assert pyplot.get_fignums() == before
     assert plot.light(np.ones(4)).figure.number in pyplot.get_fignums()
 
