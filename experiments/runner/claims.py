@@ -34,6 +34,7 @@ class Claim:
     unit: str = ""
     digits: int | None = None
     preset: str = ""
+    our_bound: bool = False  # the paper puts no number to its sentence
     note: str = ""
 
     @property
@@ -46,7 +47,8 @@ class Claim:
     def bound(self) -> str:
         """The bound in words."""
         ends = (("at least", self.at_least), ("at most", self.at_most))
-        return " and ".join(f"{word} {self.say(end)}" for word, end in ends if end is not None)
+        said = " and ".join(f"{word} {self.say(end)}" for word, end in ends if end is not None)
+        return f"{said} (our bound)" if self.our_bound else said
 
     def say(self, value: float) -> str:
         """A number of its kind, with the unit."""

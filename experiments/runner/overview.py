@@ -15,6 +15,13 @@ from .registry import Entry
 from .report import write
 from .results import Run, find
 
+# What stands below the summary.
+ABOUT = (
+    "Open: no results that could tell. The preset `paper` runs the paper's scenes; `quick` runs a "
+    "small stand-in, and what it says of a paper's claim is a first hint. Stale: the code, or the "
+    "preset, is no longer that of the results."
+)
+
 
 @dataclasses.dataclass(frozen=True)
 class Chapter:

@@ -8,12 +8,12 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from .claims import Verdict
-from .overview import Chapter
+from .overview import ABOUT, Chapter
 from .registry import Entry
 from .results import Run, Shown, commands, in_view
 
 _ROWS = 12  # in view; the others on demand
-_HEAVIEST, _WIDEST = 600_000, 1600  # bytes of a picture that is taken as it is; else its pixels
+_HEAVIEST, _WIDEST = 200_000, 1600  # bytes of a picture that is taken as it is; else its pixels
 _TYPES = {".png": "image/png", ".gif": "image/gif", ".webp": "image/webp", ".svg": "image/svg+xml"}
 _MARKS = {"holds": "✓", "does not hold": "✗", "open": "○"}
 
@@ -30,6 +30,7 @@ def html(chapters: Sequence[Chapter], command: str, date: str) -> str:
         "<h1>Results of the experiments</h1>",
         f'<p class="facts">{date} · <code>{_text(command)}</code></p>',
         *_summary(chapters),
+        f"<p>{_text(ABOUT)}</p>",
     ]
     number, here = 0, {entry.name for chapter in chapters for entry, _ in chapter.runs}
     for chapter in chapters:
@@ -93,31 +94,37 @@ def _claims(verdicts: Sequence[Verdict], here: Collection[str]) -> Iterator[str]
             f'<td data-label="measured">{_text(verdict.measured) or "–"}</td>'
             f'<td data-label="verdict"><span class="verdict">{_MARKS[verdict.holds]} '
             f"{verdict.holds}</span> {_text(verdict.margin)}</td>"
-            f'<td data-label="from">{links} {_text(verdict.preset)}</td></tr>'
+            f'<td data-label="from">{links}{_preset(verdict)}</td></tr>'
         )
     yield "</tbody></table>"
 
 
+def _preset(verdict: Verdict) -> str:
+    return f" preset {_text(verdict.preset)}" if verdict.preset else ""
+
+
 def _head(entry: Entry, run: Run) -> Iterator[str]:
-    yield f'<article id="{_anchor(entry.name)}"><h3>{_text(entry.description)}</h3>'
+    yield f'<article id="{_anchor(entry.name)}"><header><h3>{_text(entry.description)}</h3>'
     stale = f' · <strong class="stale">stale: {_text(run.stale)}</strong>' if run.stale else ""
     yield (
         f'<p class="facts"><code>{_text(entry.name)}</code> · {_text(entry.reproduces)} · '
         f"preset {_text(run.preset)} · {run.date} · {_text(run.machine)}{stale}</p>"
     )
     yield f'<pre class="command">{_text(commands(run.environment))}</pre>'
-    yield f"<details><summary>conditions</summary><p>{_text(' · '.join(run.about))}</p></details>"
+    yield f"<details><summary>conditions</summary><p>{_text(' · '.join(run.about))}</p>"
+    yield "</details></header>"
 
 
 def _table(table: Shown, name: str) -> Iterator[str]:
     shown = in_view(table)
     columns, rows = len(shown), len(table.cells)
-    yield f'<h4>{_text(table.title)}</h4><div class="table">'
+    yield f'<div class="table part"><h4>{_text(table.title)}</h4>'
     more = [f"all {columns} columns"] if not all(shown) else []
     more += [f"all {rows} rows"] if rows > _ROWS else []
     if more:
         yield f'<input type="checkbox" id="{name}"><label for="{name}">{", ".join(more)}</label>'
-    texts = [not all(map(_numeric, column)) for column in zip(*table.cells, strict=True)]
+    by_column = list(zip(*table.cells, strict=True)) or [("",)] * columns
+    texts = [not all(map(_numeric, column)) for column in by_column]
     kinds = [
         " ".join(filter(None, ["text" * text, "extra" * (not seen), head if group else ""]))
         for text, seen, head, group in zip(texts, shown, table.heads, table.groups, strict=True)
@@ -194,7 +201,8 @@ def _missing(entries: Sequence[Entry]) -> Iterator[str]:
 
 
 def _text(text: str) -> str:
-    """Text for HTML, with `code` as in Markdown."""
+    """Text for HTML, with `code` as in Markdown; a number stays with its unit."""
+    text = re.sub(r"(?<=\d) (?=(?:%|dB|fps|kB|µs|s|ms)(?!\w))", "\u00a0", text)
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", escaping.escape(text))
 
 

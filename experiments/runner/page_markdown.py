@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from .overview import Chapter
+from .overview import ABOUT, Chapter
 from .results import Shown, commands, in_view
 
 
@@ -13,6 +13,7 @@ def markdown(chapters: Sequence[Chapter], out: Path, command: str, date: str) ->
         "# Results of the experiments",
         f"{date} · `{command}`",
         "\n".join(_summary(chapters)),
+        ABOUT,
     ]
     for chapter in chapters:
         parts += [f"## {chapter.paper.title}", chapter.paper.cited]
@@ -62,7 +63,8 @@ def _claims(chapter: Chapter) -> Iterator[str]:
             f"{claim.what}: {claim.bound}",
             verdict.measured or "–",
             f"**{verdict.holds}** {verdict.margin}",
-            f"{', '.join(f'`{name}`' for name in claim.experiments)} {verdict.preset}",
+            f"{', '.join(f'`{name}`' for name in claim.experiments)}"
+            f"{verdict.preset and f' preset {verdict.preset}'}",
         )
         yield _line(cells)
 

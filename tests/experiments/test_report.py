@@ -3,6 +3,7 @@
 import html.parser
 import re
 
+import pages
 import pytest
 
 from experiments.runner import Column, Table, UserError
@@ -95,8 +96,8 @@ def test_the_page_has_verdicts_tables_pictures_and_what_is_missing(toy_paper):
     said = " ".join(" ".join(parsed.texts).split())
     for text in (
         "Sums are at least <10>. §1",
-        "the sum at degree 2: at least 10.0 12.0 ✓ holds by 2.0 toy quick",
-        "the largest sum: at most 3 kg 12 kg ✗ does not hold 4 times more toy quick",
+        "the sum at degree 2: at least 10.0 12.0 ✓ holds by 2.0 toy preset quick",
+        "the largest sum: at most 3 kg 12 kg ✗ does not hold 4 times more toy preset quick",
         "a draw: at least 0 – ○ open no results of toy.second",
         "python -m experiments run toy --preset quick",
         "degree paper ours difference 1 – 6.00 – 2 12.50 12.00 -0.50",
@@ -287,3 +288,34 @@ def test_six_columns_in_view_tell_rows_apart_and_have_the_papers():
     seen = [head for head, seen in zip(heads, in_view(table), strict=True) if seen]
     assert seen == ["light", "mesh", "b", "paper", "ours", "difference"]
     assert all(in_view(table, most=9))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(pages.chromium() is None, reason="needs Chromium, which is not here")
+def test_in_a_browser_the_page_fits_and_shows_the_rest_on_demand(toy_paper):
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+    toy_paper.run("toy")
+    table = toy_paper.out / "toy" / "quick" / "table.md"
+    columns = [Column("name", "name"), *(Column(f"x{i}", f"a long heading {i}") for i in range(9))]
+    rows = [{"name": f"row {n}"} | {f"x{i}": n * i for i in range(9)} for n in range(20)]
+    table.write_text(f"# toy\n\n{to_markdown(Table('Wide', columns, note='A note.'), rows)}")
+    report(toy_paper)
+    asked = []
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=pages.chromium(), args=["--no-sandbox"])
+        for width in (1280, 390):
+            page = browser.new_page(viewport={"width": width, "height": 800})
+            page.on("request", lambda one: asked.append(one.url))
+            page.goto((toy_paper.out / "report.html").as_uri())
+            assert page.evaluate("document.documentElement.scrollWidth") == width
+            wide = page.locator(".part table")
+            assert wide.locator("thead th:visible").count() == 6
+            assert wide.locator("tbody tr:visible").count() == 12
+            page.get_by_text("all 10 columns, all 20 rows").click()
+            assert wide.locator("thead th:visible").count() == 10
+            assert wide.locator("tbody tr:visible").count() == 20
+            assert page.evaluate("document.documentElement.scrollWidth") == width
+            assert not page.get_by_text("A note.").is_visible()
+        browser.close()
+    assert {url.partition(":")[0] for url in asked} <= {"file", "data"}
+    assert len([url for url in asked if url.startswith("file:")]) == 2
