@@ -2,6 +2,7 @@
 
 import functools
 import math
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -104,8 +105,8 @@ def _radiance(sun, turbidity, space: Space):
     geometry, turbidity = angles(sun, sun), turbidity[..., 0]
     mass = optical_mass(geometry.theta_sun, geometry.cos_sun)
     spectrum = _transmittance(*(t[..., None] for t in jnp.broadcast_arrays(mass, turbidity)))
-    weights = _KILOLUMENS_PER_WATT * STEP * color_matching() * SOLAR_RADIANCE
-    x, y, z = jnp.moveaxis(matmul(spectrum, jnp.asarray(weights.T, sun.dtype)), -1, 0)
+    weights = jnp.asarray(atmosphere().weights.T, sun.dtype)
+    x, y, z = jnp.moveaxis(matmul(spectrum, weights), -1, 0)
     above = (geometry.cos_sun >= 0)[..., None]
     return jnp.where(above, from_xyz(x, y, z, space), 0)
 
@@ -122,11 +123,9 @@ def optical_mass(
 def _transmittance(
     mass: Float[Array, "*batch 1"], turbidity: Float[Array, "*batch 1"]
 ) -> Float[Array, "*batch wavelengths"]:
-    """Product of the transmittances of appendix A.1, wavelengths in µm there."""
-    rayleigh, aerosol = 0.008735 * (WAVELENGTHS / 1000) ** -4.08, (WAVELENGTHS / 1000) ** -1.3
+    """Product of the transmittances of appendix A.1."""
     rayleigh, aerosol, ozone, water = (
-        align(mass, jnp.asarray(t, mass.dtype))[1]
-        for t in (rayleigh, aerosol, 0.35 * OZONE, 2.0 * WATER)
+        align(mass, jnp.asarray(table, mass.dtype))[1] for table in atmosphere()[:4]
     )
     beta = 0.04608 * turbidity - 0.04586
     vapour = 0.2385 * water * mass / (1 + 20.07 * water * mass) ** 0.45
@@ -145,6 +144,28 @@ SOLAR_RADIANCE = 10 * np.array([
     2233.98, 2197.02, 2152.67, 2109.79, 2072.83, 2024.04, 1987.08, 1942.72, 1907.24,
     1862.89, 1825.92,
 ])  # fmt: skip
+
+
+class Atmosphere(NamedTuple):
+    """Holds what the sun's radiance is made of, by wavelength."""
+
+    rayleigh: Float[np.ndarray, " wavelengths"]
+    aerosol: Float[np.ndarray, " wavelengths"]  # times Ångström's β
+    ozone: Float[np.ndarray, " wavelengths"]
+    water: Float[np.ndarray, " wavelengths"]
+    weights: Float[np.ndarray, "3 wavelengths"]  # of the transmittance in X, Y and Z
+
+
+@read_only_cache(maxsize=None)
+def atmosphere() -> Atmosphere:
+    """Tables of appendix A.1, wavelengths in µm there."""
+    return Atmosphere(
+        0.008735 * (WAVELENGTHS / 1000) ** -4.08,
+        (WAVELENGTHS / 1000) ** -1.3,
+        0.35 * OZONE,
+        2.0 * WATER,
+        _KILOLUMENS_PER_WATT * STEP * color_matching() * SOLAR_RADIANCE,
+    )
 
 
 def _absorption(first: float, *values: float) -> Float[np.ndarray, " wavelengths"]:

@@ -92,3 +92,35 @@ export function basis([x, y, z], degree) {
   }
   return values;
 }
+
+// The same of a vector of any length, and three derivatives of each by the vector's x, y and z: those of
+// the polynomials, without what points along the vector, over its length.
+export function basisWithGradient(vector, degree) {
+  const length = Math.hypot(...vector);
+  const [x, y, z] = vector.map((v) => v / length);
+  const values = basis([x, y, z], degree);
+  const gradient = new Float64Array(3 * values.length);
+  let [cosine, sine, before1, before2] = [1, 0, 0, 0]; // of orders m and m - 1
+  let first = Math.sqrt(1 / (4 * Math.PI));
+  const put = (k, dx, dy, dz) => {
+    const along = dx * x + dy * y + dz * z;
+    gradient.set([dx - along * x, dy - along * y, dz - along * z].map((v) => v / length), 3 * k);
+  };
+  for (let m = 0; m <= degree; m++) {
+    let [before, last, slopeBefore, slope] = [0, first, 0, 0];
+    for (let l = m; l <= degree; l++) {
+      const middle = l * (l + 1);
+      put(middle + m, m * last * before1, -m * last * before2, slope * cosine);
+      if (m > 0) put(middle - m, m * last * before2, m * last * before1, slope * sine);
+      const size = (n) => Math.sqrt((4 * n * n - 1) / (n * n - m * m));
+      const [scale, share] = [size(l + 1), l > m ? 1 / size(l) : 0];
+      const next = scale * (z * last - share * before);
+      const nextSlope = scale * (last + z * slope - share * slopeBefore);
+      [before, last, slopeBefore, slope] = [last, next, slope, nextSlope];
+    }
+    first *= Math.sqrt(((m === 0 ? 2 : 1) * (2 * m + 3)) / (2 * m + 2));
+    [before1, before2] = [cosine, sine];
+    [cosine, sine] = [x * cosine - y * sine, x * sine + y * cosine];
+  }
+  return { values, gradient };
+}

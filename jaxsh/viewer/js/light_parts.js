@@ -1,0 +1,166 @@
+// The window, the sky and the lamp as parts of a light: their state, their controls and their coefficients.
+import { menu, slider, toggle } from "./controls.js";
+import { factorsOf, scaledBy } from "./factors.js";
+import { LampHandle } from "./handle.js";
+import { interpolated, keptNear, lampTerms } from "./near.js";
+import { NearShading } from "./near_shading.js";
+import { keptUp, skyLight, sunAt } from "./sky.js";
+import { apply, minus, plus } from "./vectors.js";
+
+const numCoefficients = (scene) => (scene.degree + 1) ** 2;
+const kindOf = (scene, state) => scene.kinds[state.index];
+
+const WINDOWS = {
+  none: "None",
+  hann: "Hann",
+  lanczos: "Lanczos",
+  "zonal-sinc": "Zonal sinc (horizon)",
+  positive: "Positive",
+};
+
+// Multiplies the coefficients by a window of the degree at which the light is cut.
+export const windowPart = {
+  start: () => ({ window: "none" }),
+  light: (light, state, scene) =>
+    scaledBy(factorsOf(scene.windows, { ...state, intensity: 1 }, numCoefficients(scene)), light),
+  controls: (viewer) => {
+    const kinds = Object.keys(viewer.scene.windows);
+    const names = kinds.map((kind) => WINDOWS[kind] ?? kind);
+    const chosen = menu("Window against ringing", names, (i) => viewer.set({ window: kinds[i] }));
+    return [{ ...chosen, show: (state) => chosen.set(kinds.indexOf(state.window)) }];
+  },
+};
+
+// Coefficients of the sky in place of those that were sent, which are those of its first sun.
+export const skyPart = {
+  start: ({ sky }) => {
+    if (!sky) return {};
+    const [latitude, longitude] = sky.place;
+    const { sun, turbidity, hasDisc: disc, time } = sky;
+    return { sun, turbidity, disc, time, latitude, longitude };
+  },
+  light: (light, state, scene) => {
+    if (kindOf(scene, state) !== "sky") return light;
+    const { sun, turbidity, disc } = state;
+    const found = skyLight(scene.sky, scene.skyTable, sun, turbidity, disc, scene.degree);
+    const cut = factorsOf(scene.windows, { ...state, window: "none" }, numCoefficients(scene));
+    return scaledBy(cut, found);
+  },
+  turn: (turn, state, scene) =>
+    kindOf(scene, state) === "sky" ? { sun: keptUp(apply(turn, state.sun)) } : undefined,
+  controls: (viewer) => (viewer.scene.sky ? skyControls(viewer) : []),
+};
+
+// The lamp's light where the mesh is: in its middle for what shows one light, at each vertex for shading.
+export const lampPart = {
+  start: ({ near }) => (near ? { lamp: near.lamp } : {}),
+  light: (light, state, scene) => {
+    if (kindOf(scene, state) !== "lamp") return light;
+    const found = interpolated(termsOf(scene, state), scene.near.grid, scene.middle);
+    const cut = factorsOf(scene.windows, { ...state, window: "none" }, numCoefficients(scene));
+    return scaledBy(cut, found);
+  },
+  shade: (renderer, light, state, side, scene) => {
+    if (kindOf(scene, state) !== "lamp") return false;
+    renderer.nearShading ??= new NearShading(renderer);
+    const factors = factorsOf(scene.windows, state, numCoefficients(scene));
+    renderer.nearShading.shade(termsOf(scene, state), factors, side);
+    return true;
+  },
+  turn: (turn, state, scene) => {
+    if (kindOf(scene, state) !== "lamp") return undefined;
+    const { middle } = scene;
+    const lamp = plus(middle, apply(turn, minus(state.lamp, middle)));
+    return { lamp: keptNear(scene.near, lamp) };
+  },
+  controls: (viewer) => (viewer.scene.near ? [new LampHandle(viewer)] : []),
+};
+
+const termsOf = (scene, state) => lampTerms(scene.near, scene.nearTerms, state.lamp, scene.degree);
+
+const RADIANS = Math.PI / 180;
+
+function skyControls(viewer) {
+  const { range } = viewer.scene.sky;
+  const height = ([x, y, z]) => Math.atan2(z, Math.hypot(x, y)) / RADIANS;
+  // From north over east, as on a compass; one that stands in the zenith keeps the north.
+  const bearing = ([x, y]) => (Math.atan2(x, y) / RADIANS + 360) % 360;
+  const sunFrom = (up, around) => {
+    const [s, c] = [Math.sin(around * RADIANS), Math.cos(around * RADIANS)];
+    const across = Math.cos(up * RADIANS);
+    return [across * s, across * c, Math.sin(up * RADIANS)];
+  };
+  const placed = (changes) => {
+    const { time, latitude, longitude } = { ...viewer.state, ...changes };
+    viewer.set({ ...changes, sun: sunAt(time, latitude, longitude) });
+  };
+  const degrees = (x) => `${x.toFixed(0)}°`;
+  const shown = (control, read) => ({ ...control, show: (state) => control.set(read(state)) });
+  const controls = [
+    shown(slider("Sun above the horizon", {
+      min: 0, max: 90, step: 1, value: 0, said: degrees,
+      changed: (up) => viewer.set({ sun: sunFrom(up, bearing(viewer.state.sun)) }),
+    }), ({ sun }) => height(sun)),
+    shown(slider("Sun's bearing from north", {
+      min: 0, max: 360, step: 1, value: 0, said: degrees,
+      changed: (around) => viewer.set({ sun: sunFrom(Math.max(0, height(viewer.state.sun)), around) }),
+    }), ({ sun }) => bearing(sun)),
+    shown(slider("Turbidity (haze)", {
+      min: range[0], max: range[1], step: 0.1, value: range[0], said: (x) => x.toFixed(1),
+      changed: (turbidity) => viewer.set({ turbidity }),
+    }), ({ turbidity }) => turbidity),
+    shown(toggle("Light of the sun itself", (disc) => viewer.set({ disc })), ({ disc }) => disc),
+    ...placeControls(placed),
+  ];
+  return controls.map((control) => onlyFor("sky", viewer.scene, control));
+}
+
+// Date, time and place: the sun stands where they say once one of them is changed.
+function placeControls(placed) {
+  const minutes = (time) => Math.floor(time / 60000) % 1440;
+  const two = (x) => String(x).padStart(2, "0");
+  let now = 0; // the time that the state has
+  const clock = slider("Time (UTC)", {
+    min: 0, max: 1439, step: 1, value: 0,
+    said: (x) => `${two(Math.floor(x / 60))}:${two(x % 60)}`,
+    changed: (x) => placed({ time: now - minutes(now) * 60000 + x * 60000 }),
+  });
+  const field = (label, properties, changed) => {
+    const input = Object.assign(document.createElement("input"), properties);
+    input.addEventListener("change", () => input.checkValidity() && input.value && changed(input));
+    const element = Object.assign(document.createElement("label"), { className: "jaxsh-field" });
+    element.append(label, input);
+    return { element, input };
+  };
+  const date = field("Date", { type: "date", min: "1900-01-01", max: "2100-12-31" }, (input) =>
+    placed({ time: input.valueAsNumber + minutes(now) * 60000 }));
+  const latitude = field("Latitude", { type: "number", min: -90, max: 90, step: "any" }, (input) =>
+    placed({ latitude: input.valueAsNumber }));
+  const longitude = field("Longitude", { type: "number", min: -360, max: 360, step: "any" }, (input) =>
+    placed({ longitude: input.valueAsNumber }));
+  const night = { element: Object.assign(document.createElement("p"), { className: "jaxsh-said" }) };
+  return [
+    { element: date.element, show: ({ time }) => {
+      now = time;
+      date.input.value = new Date(time).toISOString().slice(0, 10);
+    } },
+    { element: clock.element, show: ({ time }) => clock.set(minutes(time)) },
+    { element: latitude.element, show: (state) => (latitude.input.value = state.latitude) },
+    { element: longitude.element, show: (state) => (longitude.input.value = state.longitude) },
+    { element: night.element, show: ({ sun }) => {
+      night.element.textContent = sun[2] < 0
+        ? "The sun is below the horizon: dark here, for the model has no twilight." : "";
+    } },
+  ];
+}
+
+// A control that is seen while the light is of a kind.
+export function onlyFor(kind, scene, control) {
+  return {
+    element: control.element,
+    show: (state) => {
+      control.element.hidden = kindOf(scene, state) !== kind;
+      control.show(state);
+    },
+  };
+}
