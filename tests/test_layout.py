@@ -37,6 +37,7 @@ DOORS = {
     "harmonics._conventions",
     "harmonics._tables",
     "harmonics._turns",
+    "sky._sun",
     "transfer._glossy_kernels",
 }
 # First words of a docstring that hide its verb.

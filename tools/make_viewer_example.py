@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike
 
-from jaxsh import adaptive, geometry, harmonics, imaging, sky, sphere, transfer, viewer
+from jaxsh import adaptive, geometry, harmonics, imaging, midrange, sphere, transfer, viewer
 
 DEGREE = 6
 
@@ -24,20 +24,22 @@ def make_page(path: Path) -> Path:
     mesh = geometry.knot(4000)
     baked = transfer.bake(mesh, degree=DEGREE, directions=1024, bounces=1, progress=False)
     studio = sphere.project_lat_long(imaging.studio(), DEGREE)
-    afternoon = np.array([0.6, -0.6, 0.53]) / np.linalg.norm([0.6, -0.6, 0.53])
-    clear = sky.preetham_harmonics(afternoon, 3.0, DEGREE)
     lights = {
         "studio, softened": studio * harmonics.window("hann", DEGREE),
         "studio as it is": studio,
-        "clear sky, without the sun's disc": clear * (studio[0, 0] / clear[0, 0]),
     }
+    ball = midrange.Sphere(
+        jnp.array([0.9, -1.1, 1.0]), jnp.array(0.12), jnp.array([90.0, 75.0, 55.0])
+    )
     return viewer.export_html(
         path,
         baked,
         jnp.stack(list(lights.values())),
         mesh.faces,
         albedo=np.array([0.8, 0.62, 0.48]),
-        names=list(lights),
+        names=[*lights, "clear sky: drag the sun", "a lamp: drag it"],
+        sky=viewer.Sky(),
+        lamp=viewer.Lamp(ball),
         values=values_of(mesh, baked, studio),
         title="A knot to relight",
     )

@@ -5,6 +5,8 @@ whenever the light changes. The pages are plain WebGL2 and need neither a networ
 """
 
 from ._html import export_html
+from ._lamp import Lamp
+from ._sky import Sky
 from ._widget import view
 
-__all__ = ["export_html", "view"]
+__all__ = ["Lamp", "Sky", "export_html", "view"]

@@ -14,14 +14,16 @@ from jaxtyping import ArrayLike, Float, Int
 from .._core.checks import as_path
 from ..imaging import Camera
 from ..transfer import Transfer
+from ._lamp import Lamp
 from ._scene import make_scene
-from ._script import script, text
+from ._script import script, styles, text
+from ._sky import Sky
 
 
 def export_html(
     path: str | os.PathLike[str],
     transfer: Transfer,
-    light: Float[ArrayLike, "*lights 3 k"],
+    light: Float[ArrayLike, "*lights 3 k"] | None,
     faces: Int[ArrayLike, "f 3"],
     albedo: Float[ArrayLike, "..."] = 0.8,
     *,
@@ -30,6 +32,8 @@ def export_html(
     names: Sequence[str] | None = None,
     title: str = "jaxsh",
     values: Mapping[str, ArrayLike] | None = None,
+    sky: Sky | None = None,
+    lamp: Lamp | None = None,
 ) -> Path:
     """Write a mesh to one HTML file, in which it is seen from all sides and relit.
 
@@ -37,8 +41,11 @@ def export_html(
     a mail or an archive. Dragging orbits; dragging with Shift, or the mirror ball that shows the
     light, turns it, exactly, for its coefficients are rotated; sliders set exposure, intensity and
     the degree at which the light is cut. What is shown is `transfer.shade_diffuse` of the light,
-    carried over the faces as by `imaging.interpolate`, then `imaging.tone_map(…, exposure)`.
-    Transfer is rounded to 16 bits, each harmonic in steps of 1/32767 of its largest coefficient.
+    carried over the faces as by `imaging.interpolate`, then `imaging.tone_map(…, exposure)`. A
+    window (`harmonics.window`, of the degree at which the light is cut) may be laid on it. Under a
+    `Sky` the sun is dragged, or set by date and place; a `Lamp` is dragged, and shades each vertex
+    by its own light, as `midrange.shade` does. Transfer is rounded to 16 bits, each harmonic in
+    steps of 1/32767 of its largest coefficient.
 
     **Arguments**
 
@@ -47,18 +54,20 @@ def export_html(
       positions are the mesh's.
     - `light`: coefficients (3, K), or (n, 3, K) for several that a menu chooses from; of degree 10
       and the transfer's at most. What the transfer has beyond the light's degree is not written.
+      None with a sky or a lamp alone, which are of the transfer's degree.
     - `faces`: (f, 3), the mesh's.
     - `albedo`: a number, RGB (3,), or per vertex (V, 1) or (V, 3).
     - `camera`: where the picture starts; by default `imaging.Camera.facing` the mesh. A window of
       another shape than its picture shows more beside or above it, never less.
     - `exposure`: the factor of linear radiance from which the exposure's slider counts; by default
       `imaging.auto_exposure` of all vertices under the first light.
-    - `names`: of the lights in the menu.
+    - `names`: of the lights in the menu: those that are given, the sky, the lamp.
     - `title`: of the page.
     - `values`: further numbers (V,) at the vertices by name, to be shown in false color. Floats run
       through the colors from the least to the greatest. Integers of at most 8 kinds are levels with
       a color each, laid over the picture: of an `adaptive.AdaptiveResult`,
       `shown_degree["specular"]` shows how far Lee & Kim's filter went at each vertex.
+    - `sky`, `lamp`: further lights, which the page itself computes as they are moved.
 
     **Returns** the path. Runs on the host. Raises `ValueError` for shapes and degrees that do not
     fit, for values that are not finite and for an albedo below 0, `TypeError` for objects of
@@ -77,11 +86,13 @@ def export_html(
     ('knot.html', True)
     """
     path = as_path(path)
-    scene = make_scene(transfer, light, faces, albedo, camera, exposure, names, title, values)
+    scene = make_scene(
+        transfer, light, faces, albedo, camera, exposure, names, title, values, sky, lamp
+    )
     arrays = base64.b64encode(gzip.compress(scene.arrays, mtime=0)).decode("ascii")
     page = Template(text("page.html")).substitute(
         title=html.escape(title),
-        style=text("style.css"),
+        style=styles(),
         # No "</script>" from a name ends the element.
         header=json.dumps(scene.header).replace("<", "\\u003c"),
         arrays=arrays,

@@ -77,15 +77,20 @@ class Lamp:
 
 
 def lamp_place(lamp: Lamp) -> Float[np.ndarray, " 3"]:
-    """Where a lamp is at first, in float64."""
+    """Find where a lamp is at first, in float64."""
     given = lamp.position
-    if given is None and isinstance(lamp.light, Sphere):
-        given = lamp.light.center
-    place = as_host_float(given, "position").astype(np.float64)
-    check_finite("position", place, wait=True)
-    if place.shape != (3,):
-        raise ValueError(f"expected position (3,), got shape {place.shape}")
-    return place
+    return checked_place(
+        lamp.light.center if given is None and isinstance(lamp.light, Sphere) else given
+    )
+
+
+def checked_place(place: Any) -> Float[np.ndarray, " 3"]:
+    """A lamp's position in float64; raises `ValueError` where it is none."""
+    array = as_host_float(place, "position of the lamp").astype(np.float64)
+    check_finite("position of the lamp", array, wait=True)
+    if array.shape != (3,):
+        raise ValueError(f"expected position of the lamp (3,), got shape {array.shape}")
+    return array
 
 
 def lamp_samples(

@@ -10,23 +10,21 @@ from jaxtyping import ArrayLike, Float, Int
 
 from .._core.checks import (
     as_finite,
-    as_host_float,
     as_host_integer,
     check_all,
-    check_coefficients,
     check_faces,
     check_finite,
     check_number,
     check_type,
 )
 from ..geometry import Mesh
-from ..harmonics import num_coefficients
 from ..imaging import Camera, auto_exposure
 from ..transfer import Transfer
+from ._lamp import Lamp
+from ._lights import first_radiance, make_lights
+from ._sky import Sky
 from ._values import packed_values
 
-# Degrees that are tried in a browser; WebGL2 promises registers for a few more.
-MOST_DEGREE = 10
 # WebGL2 promises textures of 2048 texels along a side.
 _ROW, _MOST_ROWS = 1024, 2048
 _MOST_CODE = 32767  # of int16
@@ -48,7 +46,7 @@ class Codes(NamedTuple):
 
 def make_scene(
     transfer: Transfer,
-    light: Float[ArrayLike, "*lights 3 k"],
+    light: Float[ArrayLike, "*lights 3 k"] | None,
     faces: Int[ArrayLike, "f 3"],
     albedo: Float[ArrayLike, "..."],
     camera: Camera | None,
@@ -56,10 +54,12 @@ def make_scene(
     names: Sequence[str] | None,
     title: str,
     values: Mapping[str, ArrayLike] | None,
+    sky: Sky | None,
+    lamp: Lamp | None,
 ) -> Scene:
     """Check all and pack it; raises `ValueError` or `TypeError` for what does not fit."""
     check_type("transfer", transfer, Transfer)
-    lights = checked_lights(light, transfer.degree)
+    lights = make_lights(light, sky, lamp, transfer)
     count = transfer.num_points
     if count > _ROW * _MOST_ROWS:
         raise ValueError(f"expected at most {_ROW * _MOST_ROWS} points of transfer, got {count}")
@@ -76,22 +76,18 @@ def make_scene(
             Mesh(jnp.asarray(positions), jnp.asarray(corners), jnp.asarray(positions))
         )
     check_type("camera", camera, Camera)
-    coefficients = np.asarray(transfer.vectors(lights.shape[-1]))
-    rounded = quantized(coefficients)
+    rounded = quantized(np.asarray(transfer.vectors(lights.coefficients.shape[-1])))
     if exposure is None:
         # What the whole mesh sends out stands for what a picture shows of it.
-        radiance = (
-            coefficients @ lights[0].T.astype(coefficients.dtype) * np.asarray(albedo) / np.pi
-        )
-        exposure = float(auto_exposure(jnp.asarray(radiance[None])))
+        exposure = float(auto_exposure(first_radiance(lights, transfer, albedo)[None]))
     rows = math.ceil(count / _ROW)
     layers = in_layers(rounded.codes, rows)
     middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
     header = {
         "title": title,
-        "names": checked_names(names, len(lights)),
-        "lights": lights.tolist(),
-        "degree": math.isqrt(lights.shape[-1]) - 1,
+        "names": checked_names(names, lights.names()),
+        "lights": lights.coefficients.tolist(),
+        "degree": lights.degree,
         "exposure": exposure,
         "albedo": shared,
         "camera": _facts(camera),
@@ -105,7 +101,8 @@ def make_scene(
         "layers": len(layers),
         "values": value_facts,
     }
-    arrays = {
+    header |= lights.facts
+    arrays = lights.arrays | {
         "positions": positions.astype("<f4"),
         "faces": corners.astype("<u4"),
         "transfer": layers.astype("<i2"),
@@ -125,29 +122,13 @@ def packed(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Scene:
     return Scene(header | {"arrays": facts}, b"".join(parts))
 
 
-def checked_lights(light: Any, degree: int) -> np.ndarray:
-    """Lights as float64 (n, 3, K); raises `ValueError` for others, and above a degree."""
-    array = as_host_float(light, "light").astype(np.float64)
-    if array.ndim not in (2, 3) or array.shape[-2] != 3 or array.size == 0:
-        raise ValueError(f"expected light (3, K) or (n, 3, K), got shape {array.shape}")
-    most = min(degree, MOST_DEGREE)
-    if (own := check_coefficients("light", array)) > most:
-        whose = "the transfer's" if degree <= MOST_DEGREE else "what the viewer shades with"
-        raise ValueError(
-            f"the light's degree {own} is above {whose}, {most}; cut it to "
-            f"light[..., :{num_coefficients(most)}]"
-        )
-    check_finite("light", array, wait=True)
-    return array.reshape(-1, *array.shape[-2:])
-
-
-def checked_names(names: Any, count: int) -> list[str]:
+def checked_names(names: Any, default: list[str]) -> list[str]:
     """A name for each light; raises unless there are as many."""
     if names is None:
-        return [f"Light {i + 1}" for i in range(count)]
+        return default
     check_all("names", names, str)
-    if len(names) != count:
-        raise ValueError(f"expected {count} names, one for each light, got {len(names)}")
+    if len(names) != len(default):
+        raise ValueError(f"expected {len(default)} names, one for each light, got {len(names)}")
     return list(names)
 
 

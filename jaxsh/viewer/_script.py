@@ -6,18 +6,8 @@ from importlib.resources import files
 
 # Each after those that it imports from.
 _MODULES = (
-    *(
-        "harmonics",
-        "vectors",
-        "scene",
-        "gl",
-        "controls",
-        "parts",
-        "ball",
-        "pointer",
-        "view",
-        "save",
-    ),
+    *("harmonics", "vectors", "scene", "gl", "controls", "sky", "near", "factors", "near_shading"),
+    *("handle", "light_parts", "parts", "ball", "pointer", "view", "save"),
     *("ramp", "color_bar", "picking", "python_text", "overlay", "panel", "renderer", "false_color"),
     *("lobe", "viewer"),
 )
@@ -28,6 +18,11 @@ _IMPORT = re.compile(r"^import\s[^;]*?from\s+\"(\./\w+)\.js\";\n", re.MULTILINE)
 def text(name: str) -> str:
     """Read a file of the folder `js`."""
     return files("jaxsh.viewer").joinpath("js", name).read_text("utf-8")
+
+
+def styles() -> str:
+    """Join the style sheets."""
+    return text("style.css") + text("lights.css")
 
 
 @functools.cache

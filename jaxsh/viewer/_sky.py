@@ -60,14 +60,9 @@ class Sky:
     scale: float | None = None
 
     def __post_init__(self):
-        sun = as_host_float(self.sun, "sun").astype(np.float64)
-        check_finite("sun", sun, wait=True)
-        if sun.shape != (3,) or not sun.any():
-            raise ValueError(f"expected sun as a vector (3,) that is not zero, got {self.sun}")
-        if sun[2] < 0:
+        if checked_sun(self.sun)[2] < 0:
             raise ValueError(f"expected a sun that is not below the horizon, got {self.sun}")
-        low, high = _TURBIDITY
-        check_number("turbidity", self.turbidity, least=low, most=high)
+        checked_turbidity(self.turbidity)
         check_flag("disc", self.disc)
         place = as_host_float(self.place, "place").astype(np.float64)
         if place.shape != (2,) or not (abs(place) <= (90, 360)).all():
@@ -80,9 +75,23 @@ class Sky:
             check_number("scale", self.scale, above=0.0)
 
 
+def checked_sun(sun: Any) -> Float[np.ndarray, " 3"]:
+    """The direction of a sun, of unit length; raises `ValueError` where it is none."""
+    array = as_host_float(sun, "sun").astype(np.float64)
+    check_finite("sun", array, wait=True)
+    if array.shape != (3,) or not array.any():
+        raise ValueError(f"expected sun as a vector (3,) that is not zero, got {sun}")
+    return array / np.linalg.norm(array)
+
+
+def checked_turbidity(turbidity: Any) -> float:
+    low, high = _TURBIDITY
+    return check_number("turbidity", turbidity, least=low, most=high)
+
+
 def sky_light(sky: Sky, degree: int) -> Float[np.ndarray, "3 k"]:
     """Compute the coefficients of the first sun and sky, in kcd/m²."""
-    sun, turbidity = jnp.asarray(_direction(sky), jnp.result_type(float)), float(sky.turbidity)
+    sun, turbidity = jnp.asarray(checked_sun(sky.sun), jnp.result_type(float)), float(sky.turbidity)
     own = min(degree, _DEGREE)
     light = np.zeros((3, num_coefficients(degree)))
     known = preetham_harmonics(sun, turbidity, own, table="wide")
@@ -99,7 +108,7 @@ def sky_part(sky: Sky, degree: int, gain: float) -> tuple[dict[str, Any], np.nda
     zonal = np.asarray(disc(4 * math.pi * math.sin(SUN_RADIUS / 2) ** 2, degree), np.float64)
     bands = zonal * np.sqrt(4 * np.pi / (2 * np.arange(degree + 1) + 1))
     facts = {
-        "sun": _direction(sky).tolist(),
+        "sun": checked_sun(sky.sun).tolist(),
         "turbidity": float(sky.turbidity),
         "hasDisc": sky.disc,
         "place": [float(x) for x in sky.place],
@@ -126,11 +135,6 @@ def sky_part(sky: Sky, degree: int, gain: float) -> tuple[dict[str, Any], np.nda
         },
     }
     return facts, table
-
-
-def _direction(sky: Sky) -> Float[np.ndarray, " 3"]:
-    sun = np.asarray(sky.sun, np.float64)
-    return sun / np.linalg.norm(sun)
 
 
 def _milliseconds(time: datetime.datetime | str) -> float:

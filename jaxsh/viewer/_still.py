@@ -10,13 +10,21 @@ from jaxtyping import Array, ArrayLike, Float
 from ..geometry import Mesh
 from ..imaging import Camera, interpolate, rasterize, tone_map
 from ..transfer import Transfer, shade_diffuse
+from ._lamp import Lamp, lamp_radiance
 
 
 class Still:
     """Draws a mesh under a light, from where and at the exposure that a page's header says."""
 
-    def __init__(self, transfer: Transfer, faces: ArrayLike, albedo: ArrayLike, height: int):
-        self.transfer, self.albedo, self.height = transfer, albedo, height
+    def __init__(
+        self,
+        transfer: Transfer,
+        faces: ArrayLike,
+        albedo: ArrayLike,
+        height: int,
+        lamp: Lamp | None = None,
+    ):
+        self.transfer, self.albedo, self.height, self.lamp = transfer, albedo, height, lamp
         faces = jnp.asarray(np.asarray(faces, np.int32))
         self.mesh = Mesh(transfer.positions, faces, transfer.normals)
 
@@ -30,7 +38,11 @@ class Still:
         width = max(1, round(self.height * facts["aspect"]))
         camera = Camera(position, target, up, facts["fovY"], width, self.height)
         raster = rasterize(self.mesh, camera, samples=2)
-        shaded = shade_diffuse(jnp.asarray(light, dtype), self.transfer, self.albedo)
+        if header["kinds"][0] == "lamp":
+            assert self.lamp is not None
+            shaded = lamp_radiance(self.lamp, self.transfer, header["degree"], self.albedo)
+        else:
+            shaded = shade_diffuse(jnp.asarray(light, dtype), self.transfer, self.albedo)
         return _encoded(interpolate(raster, shaded), raster.alpha, header["exposure"])
 
 

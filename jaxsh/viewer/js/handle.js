@@ -1,19 +1,20 @@
 // The lamp over the picture: a disc as large as the lamp is seen, which is dragged.
 import { keptNear } from "./near.js";
-import { axesOf, dot, minus, plus } from "./vectors.js";
-import { tangentOf } from "./view.js";
+import { axesOf, dot, minus, plus, tangentOf } from "./vectors.js";
 
-const SMALLEST = 24; // pixels: what a finger can take hold of
-const STEPS = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, -10], ArrowDown: [0, 10] };
-const HINT = "Drag the lamp; the wheel over it, or Page Up and Page Down, move it along the view.";
+const LARGEST_LAMP = 120;
+const SMALLEST_LAMP = 24; // pixels: what a finger can take hold of
+const LAMP_STEPS = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, -10], ArrowDown: [0, 10] };
+const LAMP_HINT = "Drag the lamp; the wheel over it, or Page Up and Page Down, move it along the view.";
 
 export class LampHandle {
   constructor(viewer) {
     this.viewer = viewer;
-    this.element = Object.assign(document.createElement("p"), { textContent: HINT });
+    this.element = document.createElement("p");
+    Object.assign(this.element, { className: "jaxsh-said", textContent: LAMP_HINT });
     this.button = document.createElement("button");
     Object.assign(this.button, { type: "button", className: "jaxsh-lamp", title: "The lamp: drag it" });
-    this.button.setAttribute("aria-label", `Lamp. ${HINT} Arrows move it.`);
+    this.button.setAttribute("aria-label", `Lamp. ${LAMP_HINT} Arrows move it.`);
     this.#listen();
   }
 
@@ -48,7 +49,7 @@ export class LampHandle {
     if (this.hidden) return;
     const { at, pixel, behind, ends } = this.#seen();
     const { radius, radiance } = this.viewer.scene.near;
-    const size = Math.max(SMALLEST, Math.min(160, (2 * (radius ?? 0)) / pixel));
+    const size = Math.max(SMALLEST_LAMP, Math.min(LARGEST_LAMP, (2 * (radius ?? 0)) / pixel));
     const within = at.map((x, axis) => Math.max(ends[axis], Math.min(ends[axis + 2], x)));
     const outside = behind || within.some((x, axis) => x !== at[axis]);
     const { style } = this.button;
@@ -94,7 +95,7 @@ export class LampHandle {
     };
     button.addEventListener("wheel", push, { passive: false });
     button.addEventListener("keydown", (event) => {
-      if (event.key in STEPS) this.#drag(...STEPS[event.key]);
+      if (event.key in LAMP_STEPS) this.#drag(...LAMP_STEPS[event.key]);
       else if (event.key === "PageUp") this.#push(1.05);
       else if (event.key === "PageDown") this.#push(1 / 1.05);
       else return;

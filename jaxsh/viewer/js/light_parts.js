@@ -109,7 +109,7 @@ function skyControls(viewer) {
       min: range[0], max: range[1], step: 0.1, value: range[0], said: (x) => x.toFixed(1),
       changed: (turbidity) => viewer.set({ turbidity }),
     }), ({ turbidity }) => turbidity),
-    shown(toggle("Light of the sun itself", (disc) => viewer.set({ disc })), ({ disc }) => disc),
+    inRow(shown(toggle("The sun itself", (disc) => viewer.set({ disc })), ({ disc }) => disc)),
     ...placeControls(placed),
   ];
   return controls.map((control) => onlyFor("sky", viewer.scene, control));
@@ -152,6 +152,13 @@ function placeControls(placed) {
         ? "The sun is below the horizon: dark here, for the model has no twilight." : "";
     } },
   ];
+}
+
+// A button in a row of its own.
+function inRow(control) {
+  const element = Object.assign(document.createElement("div"), { className: "jaxsh-buttons jaxsh-row" });
+  element.append(control.element);
+  return { ...control, element };
 }
 
 // A control that is seen while the light is of a kind.

@@ -1,6 +1,4 @@
 // Shades each vertex by the light of a lamp near it, on the graphics processor.
-import { program } from "./gl.js";
-
 // The grid's trilinear weights, and half of the gradient of each of the eight samples around a vertex
 // (midrange.interpolate, rule "half"). Scales and factors are in the texture: across, four terms of each
 // sample, and downwards layers of four coefficients, channel after channel.
@@ -49,18 +47,18 @@ void main() {
   radiance = albedo * color * ${channels === 1 ? "sum.x" : "sum"};
 }`;
 
-const UNIT = 1; // of textures; the transfer has the first
+const TERMS_UNIT = 1; // of textures; the transfer has the first
 
 export class NearShading {
   constructor(renderer) {
     const { gl, scene } = renderer;
     this.renderer = renderer;
     this.channels = scene.nearTerms ? 3 : 1;
-    this.program = program(gl, ...renderer.shaders(SHADE_NEAR(scene, this.channels)));
+    this.program = renderer.shading(SHADE_NEAR(scene, this.channels));
     const [x, y, z] = scene.near.grid.shape;
     this.size = [4 * x * y * z, this.channels * scene.layers];
     this.terms = gl.createTexture();
-    gl.activeTexture(gl.TEXTURE0 + UNIT);
+    gl.activeTexture(gl.TEXTURE0 + TERMS_UNIT);
     gl.bindTexture(gl.TEXTURE_2D, this.terms);
     gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, ...this.size);
     for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
@@ -84,14 +82,14 @@ export class NearShading {
         }
       }
     }
-    gl.activeTexture(gl.TEXTURE0 + UNIT);
+    gl.activeTexture(gl.TEXTURE0 + TERMS_UNIT);
     gl.bindTexture(gl.TEXTURE_2D, this.terms);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RGBA, gl.FLOAT, sent);
     gl.activeTexture(gl.TEXTURE0);
     const { lower, upper, shape } = scene.near.grid;
     const at = (name) => gl.getUniformLocation(this.program, name);
     gl.useProgram(this.program);
-    gl.uniform1i(at("terms"), UNIT);
+    gl.uniform1i(at("terms"), TERMS_UNIT);
     gl.uniform3fv(at("lower"), lower.map((x, axis) => x + moved[axis]));
     gl.uniform3fv(at("spacing"), shape.map((n, axis) => (upper[axis] - lower[axis]) / (n - 1)));
     gl.uniform3fv(at("color"), color.map((x, channel) => x * scene.albedo[channel]));

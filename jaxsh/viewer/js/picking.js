@@ -1,6 +1,5 @@
 // Which vertex is under a place of the picture, and what its transfer is.
-import { axesOf, cross, dot, minus, plus } from "./vectors.js";
-import { tangentOf } from "./view.js";
+import { axesOf, cross, dot, minus, plus, tangentOf } from "./vectors.js";
 
 // The ray of a camera through a place, given from -1 to 1 to the right and upwards.
 export function rayAt(camera, [x, y], aspect) {

@@ -1,5 +1,5 @@
 // The present view, as Python that draws the same.
-import { tangentOf } from "./view.js";
+import { tangentOf } from "./vectors.js";
 
 const number = (x) => String(Number(x.toPrecision(9)));
 const row = (values) => values.map(number).join(", ");

@@ -54,7 +54,8 @@ void main() {
   shown = vec4(shownColor(exposure * seen), 1.0);
 }`;
 
-const ALBEDO = 0;
+// Attributes of shading, and of drawing.
+const SHADED = { albedo: 0, position: 1 };
 export const POSITION = 0;
 export const RADIANCE = 1;
 
@@ -66,14 +67,14 @@ export class Renderer {
     if (!gl) throw new Error("This viewer needs WebGL2, which this browser does not offer.");
     this.gl = gl;
     this.scene = scene;
-    const shade = program(gl, SHADE(scene), NOTHING, { albedo: ALBEDO }, ["radiance"]);
+    const shade = this.shading(SHADE(scene));
     const show = program(gl, PLACE, SHOW, { position: POSITION, radiance: RADIANCE });
     this.shadeProgram = shade;
     this.showProgram = show;
     this.lightAt = gl.getUniformLocation(shade, "light");
     this.#sendTransfer();
-    this.#sendAlbedo();
     this.#sendMesh();
+    this.#sendShaded();
     this.feedback = gl.createTransformFeedback();
     const error = gl.getError();
     if (error) throw new Error(`The graphics processor did not take the mesh (WebGL ${error}).`);
@@ -93,21 +94,11 @@ export class Renderer {
     }
   }
 
-  #sendAlbedo() {
-    const { gl, scene } = this;
-    this.shadeArrays = gl.createVertexArray();
-    gl.bindVertexArray(this.shadeArrays);
-    if (scene.albedoCodes) {
-      fill(gl, gl.ARRAY_BUFFER, gl.createBuffer(), scene.albedoCodes);
-      gl.enableVertexAttribArray(ALBEDO);
-      gl.vertexAttribPointer(ALBEDO, 3, gl.UNSIGNED_SHORT, true, 0, 0);
-    }
-  }
-
   // Two sides, A and B, have the mesh in common; each has radiance of its own.
   #sendMesh() {
     const { gl, scene } = this;
     const [positions, faces] = [gl.createBuffer(), gl.createBuffer()];
+    this.positions = positions;
     fill(gl, gl.ARRAY_BUFFER, positions, scene.positions);
     fill(gl, gl.ELEMENT_ARRAY_BUFFER, faces, scene.faces);
     this.sides = [0, 1].map(() => {
@@ -126,6 +117,22 @@ export class Renderer {
     });
   }
 
+  // What shading programs take of each vertex.
+  #sendShaded() {
+    const { gl, scene } = this;
+    this.shadeArrays = gl.createVertexArray();
+    gl.bindVertexArray(this.shadeArrays);
+    if (scene.albedoCodes) {
+      fill(gl, gl.ARRAY_BUFFER, gl.createBuffer(), scene.albedoCodes);
+      gl.enableVertexAttribArray(SHADED.albedo);
+      gl.vertexAttribPointer(SHADED.albedo, 3, gl.UNSIGNED_SHORT, true, 0, 0);
+    }
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.positions);
+    gl.enableVertexAttribArray(SHADED.position);
+    gl.vertexAttribPointer(SHADED.position, 3, gl.FLOAT, false, 0, 0);
+    gl.bindVertexArray(null);
+  }
+
   // Computes every vertex's radiance of a side from a light, three arrays of K coefficients.
   shade(light, side = 0) {
     const { gl, scene } = this;
@@ -138,8 +145,19 @@ export class Renderer {
     }
     gl.useProgram(this.shadeProgram);
     gl.uniform4fv(this.lightAt, sent);
+    this.run(side);
+  }
+
+  // A program that shades: from `position` and `albedo` of a vertex it makes the `radiance`.
+  shading(source) {
+    return program(this.gl, source, NOTHING, SHADED, ["radiance"]);
+  }
+
+  // Runs the shading program in use for the vertices of a side.
+  run(side) {
+    const { gl, scene } = this;
     gl.bindVertexArray(this.shadeArrays);
-    if (!scene.albedoCodes) gl.vertexAttrib3f(ALBEDO, 1, 1, 1);
+    if (!scene.albedoCodes) gl.vertexAttrib3f(SHADED.albedo, 1, 1, 1);
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
     gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, this.sides[side].radiance);

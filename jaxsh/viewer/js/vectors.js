@@ -37,11 +37,16 @@ export function axesOf(camera) {
   return [right, cross(right, forward), forward];
 }
 
+// How large the picture of a camera is in a window of another shape: the tangent of half its height.
+export function tangentOf(camera, aspect) {
+  return Math.tan((camera.fovY * Math.PI) / 360) * Math.max(1, camera.aspect / aspect);
+}
+
 // From space to clip coordinates, by columns as WebGL wants it. The whole picture of `camera`, whose
 // width is `camera.aspect` times its height, is in the middle of one of another `aspect`.
 export function clipMatrix(camera, aspect, near, far) {
   const [right, up, forward] = axesOf(camera);
-  const tan = Math.tan((camera.fovY * Math.PI) / 360) * Math.max(1, camera.aspect / aspect);
+  const tan = tangentOf(camera, aspect);
   const depth = (far + near) / (far - near);
   const rows = [
     right.map((x) => x / (tan * aspect)),

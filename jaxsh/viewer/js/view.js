@@ -1,13 +1,8 @@
 // Changes of a camera and of the light's rotation, from distances on the screen.
 import { PARTS } from "./parts.js";
-import { about, axesOf, minus, multiply, orbited, plus } from "./vectors.js";
+import { about, axesOf, minus, multiply, orbited, plus, tangentOf } from "./vectors.js";
 
 export const UNTURNED = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-
-// How large the picture of a camera is in a window of another shape: the tangent of half its height.
-export function tangentOf(camera, aspect) {
-  return Math.tan((camera.fovY * Math.PI) / 360) * Math.max(1, camera.aspect / aspect);
-}
 
 export class View {
   // `viewer` has `state`, `set(some)`, `scene`, and `extent()`: width and height of one view, in
@@ -24,11 +19,11 @@ export class View {
 
   // The same in radians.
   turnBy(across, over, which) {
-    const { camera, rotation } = this.viewer.state;
+    const { state, scene } = this.viewer;
+    const { camera, rotation } = state;
     if (which === "camera") return this.viewer.set({ camera: orbited(camera, across, over) });
     const [right] = axesOf(camera);
     const turn = multiply(about(camera.up, across), about(right, over));
-    const { state, scene } = this.viewer;
     const other = PARTS.map((part) => part.turn?.(turn, state, scene)).find((some) => some);
     return this.viewer.set(other ?? { rotation: multiply(turn, rotation) });
   }

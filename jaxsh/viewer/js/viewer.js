@@ -87,8 +87,9 @@ export class Viewer {
     this.set({});
   }
 
+  // In place of those that were given at first; sky and lamp stay.
   setLights(lights) {
-    this.lights = lights;
+    this.lights = [...lights, ...this.scene.lights.slice(lights.length)];
     this.#draw(true);
   }
 

@@ -10,6 +10,7 @@ function render({ model, el }) {
   root.style.height = `${model.get("height")}px`;
   root.textContent = "Waiting for the mesh …";
   const lights = () => viewer?.setLights(model.get("lights"));
+  const moved = () => viewer?.set(model.get("moved"));
   const received = (message, buffers) => {
     if (message.kind !== "scene" || viewer) return;
     const view = buffers[0];
@@ -18,16 +19,19 @@ function render({ model, el }) {
     try {
       viewer = new Viewer(root, unpacked(message.header, bytes));
       lights();
+      moved();
     } catch (error) {
       root.textContent = `The picture cannot be shown: ${error.message}`;
     }
   };
   model.on("msg:custom", received);
   model.on("change:lights", lights);
+  model.on("change:moved", moved);
   model.send({ kind: "ready" });
   return () => {
     model.off("msg:custom", received);
     model.off("change:lights", lights);
+    model.off("change:moved", moved);
     viewer?.release();
   };
 }
