@@ -117,12 +117,23 @@ def _report(arguments: list[str]) -> int:
 
         def run(entry: Entry, preset: str) -> None:
             chosen = argparse.Namespace(**vars(options) | {"preset": preset})
-            _job(entry.name, known, chosen, [], data).run()
+            job = _job(entry.name, known, chosen, [], data)
+            try:
+                job.run()
+            finally:
+                _forget()
 
         code = overview.run_due(overview.due(chapters, options.preset), run)
         chapters = overview.collect(known, options.names, options.out, options.preset)
     print(*overview.write_pages(chapters, options.out, _PROGRAM + " report"), sep="\n")
     return code
+
+
+def _forget() -> None:
+    """Drop what JAX has compiled: of all experiments together it would be gigabytes."""
+    import jax
+
+    jax.clear_caches()
 
 
 def _run(arguments: list[str]) -> int:

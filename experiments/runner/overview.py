@@ -13,7 +13,7 @@ from .claims import Paper, Verdict
 from .errors import UserError, unknown
 from .registry import Entry
 from .report import write
-from .results import Run, find
+from .results import Run, find, unfinished
 
 # What stands below the summary.
 ABOUT = (
@@ -30,6 +30,7 @@ class Chapter:
     paper: Paper
     verdicts: list[Verdict]
     runs: list[tuple[Entry, Run | None]]
+    missing: list[tuple[Entry, str]]  # and how the last run ended, where one has begun
 
     @property
     def counts(self) -> Counter[str]:
@@ -68,7 +69,9 @@ def collect(
             for claim in paper.claims
             if shown & set(claim.experiments)
         ]
-        chapters.append(Chapter(paper, verdicts, [(e, found[e.name]) for e in chosen]))
+        runs = [(entry, found[entry.name]) for entry in chosen]
+        missing = [(entry, unfinished(entry, out)) for entry, run in runs if run is None]
+        chapters.append(Chapter(paper, verdicts, runs, missing))
     return chapters
 
 

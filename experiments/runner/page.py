@@ -10,7 +10,7 @@ from pathlib import Path
 from .claims import Verdict
 from .overview import ABOUT, Chapter
 from .registry import Entry
-from .results import Run, Shown, commands, in_view
+from .results import Run, Shown, commands, in_view, is_number
 
 _ROWS = 12  # in view; the others on demand
 _HEAVIEST, _WIDEST = 200_000, 1600  # bytes of a picture that is taken as it is; else its pixels
@@ -49,7 +49,7 @@ def html(chapters: Sequence[Chapter], command: str, date: str) -> str:
                 parts += _table(table, f"t{number}")
             parts += _figures(run)
             parts.append("</article>")
-        parts += _missing([entry for entry, run in chapter.runs if run is None])
+        parts += _missing(chapter)
         parts.append("</section>")
     parts.append("</main></body></html>\n")
     return "\n".join(parts)
@@ -124,7 +124,7 @@ def _table(table: Shown, name: str) -> Iterator[str]:
     if more:
         yield f'<input type="checkbox" id="{name}"><label for="{name}">{", ".join(more)}</label>'
     by_column = list(zip(*table.cells, strict=True)) or [("",)] * columns
-    texts = [not all(map(_numeric, column)) for column in by_column]
+    texts = [not all(map(is_number, column)) for column in by_column]
     kinds = [
         " ".join(filter(None, ["text" * text, "extra" * (not seen), head if group else ""]))
         for text, seen, head, group in zip(texts, shown, table.heads, table.groups, strict=True)
@@ -187,15 +187,16 @@ def _embedded(path: Path) -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
-def _missing(entries: Sequence[Entry]) -> Iterator[str]:
-    if not entries:
+def _missing(chapter: Chapter) -> Iterator[str]:
+    if not chapter.missing:
         return
     yield '<h3>Missing</h3><ul class="missing">'
-    for entry in entries:
+    for entry, ended in chapter.missing:
+        last = f' <strong class="stale">last run: {_text(ended)}</strong>' if ended else ""
         yield (
             f'<li id="{_anchor(entry.name)}">{_text(entry.description)} <span class="where">'
-            f'{_text(entry.reproduces)}</span><pre class="command">python -m experiments run '
-            f"{_text(entry.name)} --preset paper</pre></li>"
+            f'{_text(entry.reproduces)}</span>{last}<pre class="command">python -m experiments '
+            f"run {_text(entry.name)} --preset paper</pre></li>"
         )
     yield "</ul>"
 
@@ -208,7 +209,3 @@ def _text(text: str) -> str:
 
 def _anchor(name: str) -> str:
     return re.sub(r"[^\w]+", "-", name)
-
-
-def _numeric(cell: str) -> bool:
-    return cell == "–" or bool(re.fullmatch(r"[+−-]?(\d[\d.,]*(e[+-]?\d+)?|nan|inf)", cell))

@@ -32,11 +32,12 @@ def markdown(chapters: Sequence[Chapter], out: Path, command: str, date: str) ->
             ]
             for caption, path in run.pictures:
                 parts.append(f"![{caption}]({path.relative_to(out).as_posix()})")
-        missing = [entry for entry, run in chapter.runs if run is None]
-        if missing:
-            lines = [
-                f"- `{entry.name}`: {entry.description} ({entry.reproduces})" for entry in missing
-            ]
+        if chapter.missing:
+            lines = (
+                f"- `{entry.name}`: {entry.description} ({entry.reproduces})"
+                f"{ended and f'; last run: {ended}'}"
+                for entry, ended in chapter.missing
+            )
             parts += ["### Missing", "\n".join(lines)]
     return "\n\n".join(parts) + "\n"
 

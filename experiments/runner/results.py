@@ -175,24 +175,23 @@ def _heads(texts: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def in_view(table: Shown, most: int = 6) -> list[bool]:
-    """Which columns to show at first: what tells the rows apart, what the paper has, then others.
+    """Which columns to show at first: what tells the rows apart, the paper's and ours, then others.
 
-    A column that says the same in every row comes last.
+    Sizes that the paper has too come after its results, and what is the same in every row last.
     """
     count = len(table.heads)
     if count <= most:
         return [True] * count
-    varies = [len({row[i] for row in table.cells}) > 1 for i in range(count)]
-    labels = []
-    for i in range(count):
-        if i and (table.groups[i] or all(map(_is_number, (row[i] for row in table.cells)))):
-            break
-        labels.append(i)
-    labels = [i for i in labels if varies[i] or len(table.cells) == 1] or [0]
-    shown = labels[:3]
+    columns = list(zip(*table.cells, strict=True)) or [()] * count
+    varies = [len(set(column)) > 1 for column in columns]
+    whole = [all(re.fullmatch(r"–|[+-]?\d+", cell) for cell in column) for column in columns]
+    compared = [i for i, group in enumerate(table.groups) if group]
+    pairs = [i for i in compared if table.heads[i] != _KINDS[2]]
+    shown = _labels(columns, table.groups, varies)
     for wanted in (
-        [i for i in range(count) if table.groups[i] and varies[i]],
-        [i for i in range(count) if table.groups[i]],
+        [i for i in pairs if not whole[i + (table.heads[i] == _KINDS[0])]],
+        pairs,
+        [i for i in compared if varies[i]],
         [i for i in range(count) if varies[i]],
         range(count),
     ):
@@ -202,8 +201,37 @@ def in_view(table: Shown, most: int = 6) -> list[bool]:
     return [i in shown for i in range(count)]
 
 
-def _is_number(text: str) -> bool:
-    return bool(re.fullmatch(r"[–+\-−]?[\d.]*(e[+-]?\d+)?|nan|inf|-inf", text))
+def _labels(
+    columns: Sequence[Sequence[str]], groups: Sequence[str], varies: list[bool]
+) -> list[int]:
+    """The columns that tell rows apart: texts of the first ones, and numbers as far as needed."""
+    first: list[int] = []
+    for i, column in enumerate(columns):
+        if groups[i] or (any("." in cell for cell in column) and all(map(is_number, column))):
+            break
+        first.append(i)
+    texts = [i for i in first if varies[i] and not all(map(is_number, columns[i]))]
+    labels = texts[:3]
+    for i in first:
+        told = set(zip(*(columns[k] for k in labels), strict=True))
+        if len(labels) < 3 and varies[i] and i not in labels and len(told) < len(columns[i]):
+            labels.append(i)
+    return labels or [0]
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell holds a number, or nothing."""
+    return cell == "–" or bool(re.fullmatch(r"[+−-]?(\d[\d.,]*(e[+-]?\d+)?|nan|inf)", cell))
+
+
+def unfinished(entry: Entry, out: Path) -> str:
+    """How the last run ended that left no results, or ""."""
+    for preset in entry.presets:
+        path = out / entry.name / f"{preset}.partial" / "environment.json"
+        if path.exists():
+            ran = _json(path)
+            return f"{ran['status']} on {ran['date'][:10]}"
+    return ""
 
 
 def commands(run: Mapping[str, Any]) -> str:

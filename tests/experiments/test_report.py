@@ -3,6 +3,7 @@
 import html.parser
 import re
 
+import jax
 import pages
 import pytest
 
@@ -74,7 +75,9 @@ class Page(html.parser.HTMLParser):
 
 
 @pytest.fixture
-def toy_paper(toys):
+def toy_paper(toys, monkeypatch):
+    # What other tests have compiled should stay.
+    monkeypatch.setattr(jax, "clear_caches", lambda: None)
     (toys.folder / "toy" / "paper.toml").write_text(PAPER)
     return toys
 
@@ -170,6 +173,7 @@ def test_a_failure_does_not_keep_the_others(toy_paper):
     code, _, stderr, page, _ = report(toy_paper, "--all")
     assert code == 1
     assert "1 of 2 failed: toy" in stderr
+    assert "last run: failed on " in page
     assert "a draw: at least 0" in page
 
 
@@ -280,14 +284,36 @@ def test_a_table_is_read_back_as_it_was_written():
     )
 
 
+def view(heads, groups, cells, most=6):
+    shown = in_view(Shown("", heads, groups, cells, ""), most)
+    return [head for head, seen in zip(heads, shown, strict=True) if seen]
+
+
 def test_six_columns_in_view_tell_rows_apart_and_have_the_papers():
-    heads = ["light", "mesh", "degree", "a", "b", "paper", "ours", "difference", "c"]
-    groups = ["", "", "", "", "", "fps", "fps", "fps", ""]
-    cells = [[name, "knot", "4", "1", name, "2", str(i), "4", "5"] for i, name in enumerate("xyz")]
-    table = Shown("", heads, groups, cells, "")
-    seen = [head for head, seen in zip(heads, in_view(table), strict=True) if seen]
-    assert seen == ["light", "mesh", "b", "paper", "ours", "difference"]
-    assert all(in_view(table, most=9))
+    heads = ["light", "mesh", "degree", *(["paper", "ours", "difference"] * 2), "a", "b"]
+    groups = ["", "", "", *["vertices"] * 3, *["fps"] * 3, "", ""]
+    cells = [
+        [light, "knot", "4", "52", str(n), "+1", "5.4", f"{n}.5", "+0.1", "1.0", f"{n}.0"]
+        for n, light in enumerate("xyz")
+    ]
+    # One column tells the rows apart; the paper's results, then its sizes, then what varies.
+    seen = in_view(Shown("", heads, groups, cells, ""))
+    assert [i for i, one in enumerate(seen) if one] == [0, 3, 4, 6, 7, 10]
+    seen = in_view(Shown("", heads, groups, cells, ""), most=3)
+    assert [i for i, one in enumerate(seen) if one] == [0, 6, 7]
+    assert all(in_view(Shown("", heads, groups, cells, ""), most=11))
+
+
+def test_numbers_tell_rows_apart_where_texts_do_not():
+    heads = ["environment", "degree", "method", "size", "x", "y", "z"]
+    cells = [
+        ["studio", degree, method, "9", "0.1", "1.0", f"{i}.0"]
+        for i, (degree, method) in enumerate((d, m) for d in "24" for m in ("tiles", "full"))
+    ]
+    none = [""] * 7
+    assert view(heads, none, cells) == ["environment", "degree", "method", "size", "x", "z"]
+    assert view(heads, none, cells, most=3) == ["degree", "method", "z"]
+    assert view(heads, none, [], most=2) == ["environment", "degree"]
 
 
 @pytest.mark.slow
