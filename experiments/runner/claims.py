@@ -164,5 +164,6 @@ def _margin(claim: Claim, value: float, least: float) -> str:
     if len(ends) == 1 and claim.unit != "dB" and min(ends[0], value) > 0:
         times = max(value / ends[0], ends[0] / value)
         if times >= 2:
-            return f"{times:.2g} times {'more' if value > ends[0] else 'less'}"
+            count = f"{float(f'{times:.2g}'):,.0f}" if times >= 10 else f"{times:.2g}"
+            return f"{count} times {'more' if value > ends[0] else 'less'}"
     return said

@@ -193,6 +193,7 @@ def in_view(table: Shown, most: int = 6) -> list[bool]:
         pairs,
         [i for i in compared if varies[i]],
         [i for i in range(count) if varies[i]],
+        [i for i in range(count) if not whole[i] and all(map(is_number, columns[i]))],
         range(count),
     ):
         for i in wanted:

@@ -239,7 +239,7 @@ def test_places_that_name_no_number():
     [
         ({"at_least": 3.0}, "holds", "by 1 m"),
         ({"at_most": 3.0}, "does not hold", "by 1 m"),
-        ({"at_most": 0.04}, "does not hold", "1e+02 times more"),
+        ({"at_most": 0.04}, "does not hold", "100 times more"),
         ({"at_least": 3.0, "at_most": 9.0}, "holds", "by 1 m"),
         ({"at_least": 4.0, "preset": "paper"}, "open", "only the preset paper can tell"),
         ({"at_least": 4.0, "over": Place.read("e | degree=9 | x")}, "open", "not measured"),
