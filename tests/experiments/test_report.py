@@ -311,7 +311,7 @@ def test_numbers_tell_rows_apart_where_texts_do_not():
         for i, (degree, method) in enumerate((d, m) for d in "24" for m in ("tiles", "full"))
     ]
     none = [""] * 7
-    assert view(heads, none, cells) == ["environment", "degree", "method", "size", "x", "z"]
+    assert view(heads, none, cells) == ["environment", "degree", "method", "x", "y", "z"]
     assert view(heads, none, cells, most=3) == ["degree", "method", "z"]
     assert view(heads, none, [], most=2) == ["environment", "degree"]
 
