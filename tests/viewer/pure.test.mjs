@@ -122,6 +122,6 @@ test("numbers and a turned light in words", () => {
   assert.deepEqual(said, ["0", "−0.5", "12350", "1.23e−7", "2.50e+6"]);
   const [{ camera }] = cameras;
   const text = pythonText({ camera, rotation: about([0, 0, 1], 0.5) }, 0.25, 30, 40);
-  assert.match(text, /rotation = \[\[0.877582562, -0.479425539, 0\]/);
+  assert.match(text, /rotation = \[\[0.877582562, -0.479425539, 0\.0\]/);
   assert.match(text, /exposure = 0.25\n/);
 });

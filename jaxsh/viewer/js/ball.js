@@ -14,17 +14,19 @@ export class Ball {
     this.image = this.context.createImageData(SIZE, SIZE);
     // In axes to the right, upwards and towards the eye, so that they stay when the camera moves.
     this.spots = [];
+    const values = [];
     for (let i = 0; i < SIZE * SIZE; i++) {
       const x = (2 * (i % SIZE) + 1) / SIZE - 1;
       const y = 1 - (2 * Math.floor(i / SIZE) + 1) / SIZE;
       const squared = x * x + y * y;
       if (squared >= 1) continue;
       const z = Math.sqrt(1 - squared);
-      const values = Float32Array.from(basis([2 * z * x, 2 * z * y, 2 * z * z - 1], degree));
+      values.push(basis([2 * z * x, 2 * z * y, 2 * z * z - 1], degree));
       // The outermost pixels are partly beside the ball.
       const cover = Math.min(1, ((1 - Math.sqrt(squared)) * SIZE) / 2);
-      this.spots.push({ place: 4 * i, values, cover });
+      this.spots.push({ place: 4 * i, cover });
     }
+    this.values = Float32Array.from(values.flatMap((some) => [...some]));
   }
 
   // Radiance negative by ringing is black.
@@ -32,15 +34,20 @@ export class Ball {
     const [right, up, forward] = axesOf(camera);
     const blocks = rotationBlocks([right, up, forward.map((x) => -x)], this.degree);
     const seen = light.map((channel) => Float32Array.from(turned(channel, blocks)));
-    const { data } = this.image;
-    for (const { place, values, cover } of this.spots) {
-      seen.forEach((channel, c) => {
-        let sum = 0;
-        for (let k = 0; k < values.length; k++) sum += values[k] * channel[k];
+    const { image: { data }, values } = this;
+    const [red, green, blue] = seen;
+    this.spots.forEach(({ place, cover }, spot) => {
+      let [r, g, b] = [0, 0, 0];
+      for (let k = 0, at = spot * red.length; k < red.length; k++, at++) {
+        r += values[at] * red[k];
+        g += values[at] * green[k];
+        b += values[at] * blue[k];
+      }
+      [r, g, b].forEach((sum, c) => {
         data[place + c] = 255 * encoded(Math.max(0, Math.min(1, exposure * sum)));
       });
       data[place + 3] = 255 * cover;
-    }
+    });
     this.context.putImageData(this.image, 0, 0);
   }
 }

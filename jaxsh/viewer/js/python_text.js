@@ -1,7 +1,8 @@
 // The present view, as Python that draws the same.
 import { tangentOf } from "./vectors.js";
 
-const number = (x) => String(Number(x.toPrecision(9)));
+// As a float of Python has it.
+const number = (x) => String(Number(x.toPrecision(9))).replace(/^-?\d+$/, "$&.0");
 const row = (values) => values.map(number).join(", ");
 
 // A camera whose picture is that of a window of `width` by `height` pixels, the exposure, and how the

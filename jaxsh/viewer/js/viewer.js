@@ -111,6 +111,14 @@ export class Viewer {
     return this.renderer.colors(side);
   }
 
+  // Draws now, after shading where what shades has changed.
+  draw() {
+    if (this.shades) this.#shown().forEach((side) => this.#shade(side));
+    this.shades = false;
+    this.#paint(this.canvas.width, this.canvas.height);
+    this.overlay.show();
+  }
+
   // What the present camera sees, as RGBA in 8 bits, of any size.
   pixels(width, height, samples = 1) {
     this.#shown().forEach((side) => this.#shade(side));
@@ -240,11 +248,7 @@ export class Viewer {
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
-      if (!this.renderer || this.released) return;
-      if (this.shades) this.#shown().forEach((side) => this.#shade(side));
-      this.shades = false;
-      this.#paint(this.canvas.width, this.canvas.height);
-      this.overlay.show();
+      if (this.renderer && !this.released) this.draw();
     });
   }
 
@@ -274,7 +278,8 @@ export class Viewer {
 
   #listen() {
     const { canvas } = this;
-    const view = new View(this);
+    this.view = new View(this);
+    const { view } = this;
     const which = (event) => (event.shiftKey || this.turns ? "light" : "camera");
     listenToDrags(canvas, view, which, ({ offsetX, offsetY }) => this.pick(offsetX, offsetY));
     this.overlay.balls.forEach((ball) => listenToDrags(ball.canvas, view, () => "light"));

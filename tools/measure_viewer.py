@@ -1,0 +1,114 @@
+"""Count how many changes of light a second the viewer draws: the figures of `docs/viewer.md`.
+
+python tools/measure_viewer.py [--vertices 50000] [--degree 10] [--chromium-options=...]
+
+Needs the package playwright and a Chromium that is installed; `CHROMIUM=path` names one. As it
+stands all is drawn in software (SwiftShader), so that every machine can say something; with
+`--chromium-options=""` the browser takes the graphics processor that it finds. On a machine that
+has other work, the CPU time of all of the browser's processes (Linux) says more than the clock.
+"""
+
+import argparse
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from jaxsh import geometry, transfer, viewer
+
+SOFTWARE = "--use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader"
+# Milliseconds for each of some changes, whose last pixel is waited for.
+MEASURE = """([change, seconds]) => {
+  const viewer = document.getElementById("viewer").viewer;
+  const { gl } = viewer.renderer;
+  const pixel = new Uint8Array(4);
+  const turned = (angle) => {
+    const [c, s] = [Math.cos(angle), Math.sin(angle)];
+    return [[c, -s, 0], [s, c, 0], [0, 0, 1]];
+  };
+  const changes = {
+    whole: (i) => { viewer.set({ rotation: turned(i / 50) }); viewer.draw(); },
+    light: (i) => { viewer.set({ rotation: turned(i / 50) }); viewer.light(); },
+    overlay: () => viewer.overlay.show(),
+    exposure: () => { viewer.set({ exposure: 1 }); viewer.draw(); },
+  };
+  const start = performance.now();
+  let count = 0;
+  while (performance.now() - start < 1000 * seconds || count < 5) {
+    changes[change](++count);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+  }
+  return [count, (performance.now() - start) / count];
+}"""
+FACTS = """() => {
+  const { canvas, renderer: { gl } } = document.getElementById("viewer").viewer;
+  const debug = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = gl.getParameter(debug ? debug.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
+  return [name, canvas.width, canvas.height];
+}"""
+CHANGES = {
+    "whole": "a change of light",
+    "light": "  of which turning its coefficients",
+    "overlay": "  of which the mirror ball",
+    "exposure": "a change of exposure alone",
+}
+
+
+def cpu_seconds() -> float:
+    """CPU time of all processes that descend from this one; zero where /proc is not."""
+    times, parents = {}, {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
+        except OSError:  # ended
+            continue
+        parents[int(folder.name)] = int(fields[1])
+        times[int(folder.name)] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def ours(process: int) -> bool:
+        while process in parents:
+            process = parents[process]
+            if process == os.getpid():
+                return True
+        return False
+
+    return sum(time for process, time in times.items() if ours(process))
+
+
+def main(vertices: int, degree: int, options: str, seconds: float) -> None:
+    from playwright.sync_api import sync_playwright
+
+    mesh = geometry.knot(vertices)
+    made = transfer.unshadowed(mesh.vertices, mesh.normals, degree)
+    light = np.random.default_rng(0).normal(size=(3, (degree + 1) ** 2)) * 0.1
+    light[:, 0] = 2.0
+    chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as started:
+        page = viewer.export_html(Path(folder) / "knot.html", made, light, mesh.faces)
+        print(f"{len(mesh.vertices)} vertices, degree {degree}: {page.stat().st_size / 1e6:.1f} MB")
+        arguments = [*options.split(), "--no-sandbox"]
+        browser = started.chromium.launch(executable_path=chromium, args=arguments)
+        shown = browser.new_page(viewport={"width": 1072, "height": 600})
+        shown.goto(page.as_uri())
+        shown.locator("main canvas").first.wait_for()
+        shown.wait_for_timeout(1000)
+        name, width, height = shown.evaluate(FACTS)
+        print(f"{name}, {os.cpu_count()} CPU cores, {width} x {height} pixels")
+        for change, said in CHANGES.items():
+            before = cpu_seconds()
+            count, each = shown.evaluate(MEASURE, [change, seconds])
+            busy = 1000 * (cpu_seconds() - before) / count
+            print(f"{said}: {each:.1f} ms, {1000 / each:.0f} a second; {busy:.1f} ms of CPU time")
+        browser.close()
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--vertices", type=int, default=50_000)
+    parser.add_argument("--degree", type=int, default=10)
+    parser.add_argument("--chromium-options", default=SOFTWARE)
+    parser.add_argument("--seconds", type=float, default=3.0)
+    given = parser.parse_args()
+    main(given.vertices, given.degree, given.chromium_options, given.seconds)
