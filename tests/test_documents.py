@@ -1,7 +1,7 @@
 """What a newcomer would run first: the blocks of each page, from scratch."""
 
 import numpy as np
-import pages
+import documented
 import pytest
 from matplotlib import pyplot
 from PIL import Image
@@ -18,22 +18,22 @@ def default_run(paths: list, quick: set[str]) -> list:
 @pytest.mark.parametrize(
     "page",
     default_run(
-        [page for page in pages.PAGES if pages.blocks(page) or pages.files(page)],
+        [page for page in documented.PAGES if documented.blocks(page) or documented.files(page)],
         {"README", "harmonics"},
     ),
 )
 def test_blocks_run_in_order(page, tmp_path):
     """The blocks of a page share one namespace, in a fresh process, as at a user's; the pictures
     of a how-to page are those that its code draws."""
-    code = "".join(pages.blocks(page))
+    code = "".join(documented.blocks(page))
     for package in ("torch", "optax"):
         if f"import {package}" in code:
             pytest.importorskip(package, reason=f"{page.name} is not tried without {package}")
-    pages.run(page, tmp_path)
-    for path in pages.pictures(page):
+    documented.run(page, tmp_path)
+    for path in documented.pictures(page):
         shown, drawn = (
             np.asarray(Image.open(one).convert("RGB"), float) / 255
-            for one in (path, pages.drawn(tmp_path, path))
+            for one in (path, documented.drawn(tmp_path, path))
         )
         assert drawn.shape == shown.shape
         # The page's is compressed, and another version of matplotlib draws other letters.

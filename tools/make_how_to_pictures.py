@@ -10,19 +10,19 @@ import argparse
 import tempfile
 from pathlib import Path
 
-import pages  # pyright: ignore[reportMissingImports]  # from tests
+import documented  # pyright: ignore[reportMissingImports]  # from tests
 from PIL import Image
 
 
 def main() -> None:
-    with_pictures = {page.stem: page for page in pages.PAGES if pages.pictures(page)}
+    with_pictures = {page.stem: page for page in documented.PAGES if documented.pictures(page)}
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("page", nargs="*", choices=[[], *with_pictures], help="default: all")
     for name in parser.parse_args().page or with_pictures:
         with tempfile.TemporaryDirectory() as folder:
-            pages.run(with_pictures[name], Path(folder))
-            for path in pages.pictures(with_pictures[name]):
-                shrink(pages.drawn(Path(folder), path), path)
+            documented.run(with_pictures[name], Path(folder))
+            for path in documented.pictures(with_pictures[name]):
+                shrink(documented.drawn(Path(folder), path), path)
 
 
 def shrink(drawn: Path, path: Path) -> None:
