@@ -1,7 +1,7 @@
 """What a newcomer would run first: the blocks of each page, from scratch."""
 
-import numpy as np
 import documented
+import numpy as np
 import pytest
 from matplotlib import pyplot
 from PIL import Image
