@@ -42,11 +42,10 @@ def run(page: Path, folder: Path) -> None:
     stand_in = [before.read_text("utf-8")] if before.exists() else []
     script = folder / "blocks.py"
     script.write_text("\n".join([*stand_in, *blocks(page)]), "utf-8")
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"}
+    environment.pop("JAXSH_DATA", None)  # the pictures are of what is made at run time
     subprocess.run(
-        [sys.executable, "-W", "error", script.name],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"},
-        check=True,
+        [sys.executable, "-W", "error", script.name], cwd=folder, env=environment, check=True
     )
 
 
