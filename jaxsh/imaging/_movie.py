@@ -166,16 +166,11 @@ def _write_webp(
     file: BinaryIO, frames: Iterable[Picture], *, fps: float, loop: bool, quality: float
 ) -> None:
     pictures = [_pillow(frame) for frame in frames]
-    # Pillow's own method, 0, makes larger files.
-    _save(
-        file,
-        pictures,
-        "webp",
-        durations(len(pictures), fps, 1),
-        loop=0 if loop else 1,
-        quality=quality,
-        method=4,
-    )
+    # Each frame whole: of those that hold a changed part alone, the part's outline shows, and their
+    # error is twice as large for 15 % fewer bytes. Pillow's own method, 0, makes larger files.
+    times = durations(len(pictures), fps, 1)
+    options = {"loop": 0 if loop else 1, "quality": quality, "method": 4, "kmin": 0, "kmax": 1}
+    _save(file, pictures, "webp", times, **options)
 
 
 def durations(count: int, fps: float, unit: int) -> list[int]:
