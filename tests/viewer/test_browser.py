@@ -8,8 +8,8 @@ import base64
 
 import jax.numpy as jnp
 import numpy as np
-import pages
 import pytest
+import viewer_pages as pages
 from scipy.ndimage import binary_erosion
 
 from jaxsh import harmonics, imaging, transfer, viewer

@@ -5,8 +5,8 @@ Needs what `test_browser.py` needs, and is skipped without.
 
 import jax.numpy as jnp
 import numpy as np
-import pages
 import pytest
+import viewer_pages as pages
 from test_browser import CHROMIUM, browser, colors, levels, opened  # noqa: F401
 from test_lights import DEGREE, ball
 

@@ -8,8 +8,8 @@ import io
 import jax.numpy as jnp
 import matplotlib
 import numpy as np
-import pages
 import pytest
+import viewer_pages as pages
 from PIL import Image
 from scipy.ndimage import binary_erosion
 from test_browser import CHROMIUM, browser, colors, levels, opened, read  # noqa: F401

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-import pages
 import pytest
+import viewer_pages as pages
 from scipy.spatial.transform import Rotation
 
 from jaxsh import harmonics, imaging, viewer

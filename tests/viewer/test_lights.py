@@ -11,8 +11,8 @@ from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
-import pages
 import pytest
+import viewer_pages as pages
 
 from jaxsh import harmonics, midrange, sky, viewer
 from jaxsh.viewer import _lights

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
-import pages
 import pytest
+import viewer_pages as pages
 
 from jaxsh import imaging, viewer
 from jaxsh.viewer import _script

@@ -5,8 +5,8 @@ import io
 import sys
 
 import numpy as np
-import pages
 import pytest
+import viewer_pages as pages
 from PIL import Image
 from scipy.ndimage import binary_erosion
 
