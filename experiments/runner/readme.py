@@ -1,7 +1,8 @@
 """Keep the figures and pictures of README.md those of the results.
 
 ``summary.md`` holds its blocks with places for numbers, ``summary.json`` each number with the run
-that it is from. Numbers of results that are not at hand stay as they were.
+that it is from. Numbers of results that are not at hand stay as they were. Those of "benchmarks"
+are read where ``python -m benchmarks.page`` keeps the measured rows.
 """
 
 import datetime
@@ -21,6 +22,7 @@ from .results import commands
 from .sources import ROOT
 
 _HERE = ROOT / "experiments"
+_BENCHMARKS = "benchmarks"
 _BLOCK = re.compile(r"(<!-- block (\w+)[^\n]*-->\n).*?(<!-- end -->)", re.DOTALL)
 _PLACE = re.compile(r"\{([^{}|]+\|[^{}]*?)\|([^{}|]*)\}")
 _ABOUT = re.compile(r"\{about ([^{}|]+)\}")
@@ -32,7 +34,8 @@ def renew(out: Path, preset: str) -> list[Path]:
     summary = _summary()
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     for experiment, places in _wanted(readme).items():
-        _take(summary["figures"], out, experiment, preset, places)
+        if experiment != _BENCHMARKS:
+            _take(summary["figures"], out / experiment / preset, experiment, places)
     for name, picture in summary["pictures"].items():
         _copy(out, name, picture)
     write(_HERE / "summary.json", to_json(summary))
@@ -42,7 +45,10 @@ def renew(out: Path, preset: str) -> list[Path]:
 
 def filled(readme: str, summary: Mapping[str, Any] | None = None) -> str:
     """`readme` with its blocks from ``summary.md``, their numbers from ``summary.json``."""
-    figures = (summary or _summary())["figures"]
+    figures = dict((summary or _summary())["figures"])
+    if _BENCHMARKS in (wanted := _wanted(readme)):
+        folder = ROOT / "benchmarks" / "measured"
+        _take(figures, folder, _BENCHMARKS, wanted[_BENCHMARKS])
 
     def number(place: str, style: str) -> str:
         experiment, key = _split(place)
@@ -103,9 +109,8 @@ def _split(place: str) -> tuple[str, str]:
     return experiment, f"{where} | {key}"
 
 
-def _take(figures: dict, out: Path, experiment: str, preset: str, keys: list[str]) -> None:
-    """Put the experiment's numbers into `figures`, where it has results of the preset."""
-    folder = out / experiment if experiment == "benchmarks" else out / experiment / preset
+def _take(figures: dict[str, Any], folder: Path, experiment: str, keys: list[str]) -> None:
+    """Put the experiment's numbers into `figures`, where the folder has results."""
     try:
         ran, rows = _results(folder)
     except FileNotFoundError:
