@@ -29,7 +29,7 @@ def make_page(path: Path) -> Path:
         "studio as it is": studio,
     }
     ball = midrange.Sphere(
-        jnp.array([0.9, -1.1, 1.0]), jnp.array(0.12), jnp.array([90.0, 75.0, 55.0])
+        jnp.array([0.6, -0.85, 0.6]), jnp.array(0.1), jnp.array([90.0, 75.0, 55.0])
     )
     return viewer.export_html(
         path,

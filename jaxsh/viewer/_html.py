@@ -13,7 +13,7 @@ from jaxtyping import ArrayLike, Float, Int
 
 from .._core.checks import as_path
 from ..imaging import Camera
-from ..transfer import Transfer
+from ..transfer import Material, Transfer
 from ._lamp import Lamp
 from ._scene import make_scene
 from ._script import script, styles, text
@@ -25,7 +25,7 @@ def export_html(
     transfer: Transfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
     faces: Int[ArrayLike, "f 3"],
-    albedo: Float[ArrayLike, "..."] = 0.8,
+    albedo: Float[ArrayLike, "..."] | Material = 0.8,
     *,
     camera: Camera | None = None,
     exposure: float | None = None,
@@ -56,7 +56,9 @@ def export_html(
       and the transfer's at most. What the transfer has beyond the light's degree is not written.
       None with a sky or a lamp alone, which are of the transfer's degree.
     - `faces`: (f, 3), the mesh's.
-    - `albedo`: a number, RGB (3,), or per vertex (V, 1) or (V, 3).
+    - `albedo`: a number, RGB (3,), or per vertex (V, 1) or (V, 3); or a `transfer.Material` with
+      one specular albedo, a number or (3,), and one exponent, for `transfer.shade_glossy` towards
+      the camera. Under a lamp the diffuse part alone is shown.
     - `camera`: where the picture starts; by default `imaging.Camera.facing` the mesh. A window of
       another shape than its picture shows more beside or above it, never less.
     - `exposure`: the factor of linear radiance from which the exposure's slider counts; by default

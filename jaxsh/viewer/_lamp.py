@@ -21,7 +21,7 @@ from ..midrange import (
 from ..transfer import Transfer
 
 _MOST_SAMPLES = 512  # WebGL2 promises textures of 2048 texels along a side, four for each
-_SHAPE = (4, 4, 4)
+_SHAPE = (8, 8, 8)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,8 +36,8 @@ class Lamp:
       form wherever it is dragged; or the `midrange.Expansion` of order 1 or more of any lamp at
       the samples of `grid`, which is sent once and moves with its lamp. With the second, blockers
       that were captured move along.
-    - `grid`: by default that of `midrange.grid_around` the mesh with 4 × 4 × 4 samples; at most
-      512 samples. An expansion needs its own; the lamp can be dragged as far as the grid holds
+    - `grid`: by default that of `midrange.grid_around` the mesh with 8 × 8 × 8 samples, and never
+      more than these 512. An expansion needs its own; the lamp can be dragged as far as the grid holds
       the mesh.
     - `position`: (3,), where the lamp is: by default the sphere's center. An expansion needs it.
 

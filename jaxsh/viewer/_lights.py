@@ -2,12 +2,14 @@
 
 from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import as_host_float, check_coefficients, check_finite, check_type
 from ..harmonics import degree_of, num_coefficients, window
-from ..transfer import Transfer, shade_diffuse
+from ..transfer import Material, Transfer, shade_diffuse, shade_glossy
+from ._gloss import split_material
 from ._lamp import Lamp, lamp_part, lamp_radiance
 from ._sky import Sky, sky_light, sky_part
 
@@ -25,8 +27,6 @@ class Lights(NamedTuple):
     kinds: list[str]  # "given", "sky" or "lamp", of each
     facts: dict[str, Any]  # for the header
     arrays: dict[str, np.ndarray]
-    sky: Sky | None
-    lamp: Lamp | None
 
     @property
     def degree(self) -> int:
@@ -74,17 +74,26 @@ def make_lights(light: Any, sky: Sky | None, lamp: Lamp | None, transfer: Transf
         kinds.append("lamp")
         coefficients.append(np.zeros((1, *given.shape[1:])))
     facts["kinds"] = kinds
-    return Lights(np.concatenate(coefficients), kinds, facts, arrays, sky, lamp)
+    return Lights(np.concatenate(coefficients), kinds, facts, arrays)
 
 
-def first_radiance(
-    lights: Lights, transfer: Transfer, albedo: Float[ArrayLike, "..."]
+def shaded(
+    kind: str,
+    light: Float[ArrayLike, "3 k"],
+    transfer: Transfer,
+    albedo: Float[ArrayLike, "..."] | Material,
+    eye: Float[ArrayLike, " 3"],
+    lamp: Lamp | None,
 ) -> Float[Array, "v 3"]:
-    """Compute what the vertices send out under the first light."""
-    if lights.kinds[0] == "lamp":
-        assert lights.lamp is not None
-        return lamp_radiance(lights.lamp, transfer, lights.degree, albedo)
-    return shade_diffuse(lights.coefficients[0].astype(transfer.dtype), transfer, albedo)
+    """Compute what the vertices send to an eye under a light as a page first has it."""
+    diffuse, material = split_material(albedo)
+    light = jnp.asarray(light, transfer.dtype)
+    if kind == "lamp":
+        assert lamp is not None
+        return lamp_radiance(lamp, transfer, degree_of(light.shape[-1]), diffuse)
+    if material is None:
+        return shade_diffuse(light, transfer, diffuse)
+    return shade_glossy(light, transfer, eye, material)
 
 
 def checked_lights(light: Any, degree: int) -> Float[np.ndarray, "lights 3 k"]:

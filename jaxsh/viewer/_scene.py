@@ -19,9 +19,10 @@ from .._core.checks import (
 )
 from ..geometry import Mesh
 from ..imaging import Camera, auto_exposure
-from ..transfer import Transfer
+from ..transfer import Material, Transfer
+from ._gloss import gloss_facts, split_material
 from ._lamp import Lamp
-from ._lights import first_radiance, make_lights
+from ._lights import make_lights, shaded
 from ._sky import Sky
 from ._values import packed_values
 
@@ -48,7 +49,7 @@ def make_scene(
     transfer: Transfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
     faces: Int[ArrayLike, "f 3"],
-    albedo: Float[ArrayLike, "..."],
+    albedo: Float[ArrayLike, "..."] | Material,
     camera: Camera | None,
     exposure: float | None,
     names: Sequence[str] | None,
@@ -64,7 +65,8 @@ def make_scene(
     if count > _ROW * _MOST_ROWS:
         raise ValueError(f"expected at most {_ROW * _MOST_ROWS} points of transfer, got {count}")
     corners = _checked_faces(faces, count)
-    shared, codes = _packed_albedo(albedo, count)
+    diffuse, material = split_material(albedo)
+    shared, codes = _packed_albedo(diffuse, count)
     value_facts, value_codes = packed_values(values, count)
     if exposure is not None:
         exposure = check_number("exposure", exposure, above=0.0)
@@ -79,7 +81,9 @@ def make_scene(
     rounded = quantized(np.asarray(transfer.vectors(lights.coefficients.shape[-1])))
     if exposure is None:
         # What the whole mesh sends out stands for what a picture shows of it.
-        exposure = float(auto_exposure(first_radiance(lights, transfer, albedo)[None]))
+        first = lights.kinds[0], lights.coefficients[0]
+        sent = shaded(*first, transfer, albedo, camera.position, lamp)
+        exposure = float(auto_exposure(sent[None]))
     rows = math.ceil(count / _ROW)
     layers = in_layers(rounded.codes, rows)
     middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
@@ -102,11 +106,15 @@ def make_scene(
         "values": value_facts,
     }
     header |= lights.facts
+    if material is not None:
+        header["glossy"] = gloss_facts(material, lights.degree)
     arrays = lights.arrays | {
         "positions": positions.astype("<f4"),
         "faces": corners.astype("<u4"),
         "transfer": layers.astype("<i2"),
     }
+    if material is not None:
+        arrays["normals"] = np.asarray(transfer.normals).astype("<f4")
     if codes is not None:
         arrays["albedoCodes"] = codes.astype("<u2")
     return packed(header, arrays | value_codes)

@@ -9,8 +9,9 @@ from jaxtyping import Array, ArrayLike, Float
 
 from ..geometry import Mesh
 from ..imaging import Camera, interpolate, rasterize, tone_map
-from ..transfer import Transfer, shade_diffuse
-from ._lamp import Lamp, lamp_radiance
+from ..transfer import Material, Transfer
+from ._lamp import Lamp
+from ._lights import shaded
 
 
 class Still:
@@ -20,7 +21,7 @@ class Still:
         self,
         transfer: Transfer,
         faces: ArrayLike,
-        albedo: ArrayLike,
+        albedo: ArrayLike | Material,
         height: int,
         lamp: Lamp | None = None,
     ):
@@ -30,7 +31,7 @@ class Still:
 
     def png(self, light: Float[np.ndarray, "3 k"], header: dict[str, Any]) -> bytes:
         """A PNG with the ground transparent, four samples in a pixel."""
-        facts, dtype = header["camera"], self.transfer.dtype
+        facts = header["camera"]
         position, target, up = (
             np.asarray(facts[name], self.transfer.positions.dtype)
             for name in ("position", "target", "up")
@@ -38,12 +39,9 @@ class Still:
         width = max(1, round(self.height * facts["aspect"]))
         camera = Camera(position, target, up, facts["fovY"], width, self.height)
         raster = rasterize(self.mesh, camera, samples=2)
-        if header["kinds"][0] == "lamp":
-            assert self.lamp is not None
-            shaded = lamp_radiance(self.lamp, self.transfer, header["degree"], self.albedo)
-        else:
-            shaded = shade_diffuse(jnp.asarray(light, dtype), self.transfer, self.albedo)
-        return _encoded(interpolate(raster, shaded), raster.alpha, header["exposure"])
+        first = header["kinds"][0], light
+        sent = shaded(*first, self.transfer, self.albedo, camera.position, self.lamp)
+        return _encoded(interpolate(raster, sent), raster.alpha, header["exposure"])
 
 
 def _encoded(radiance: Float[Array, "h w 3"], alpha: Float[Array, "h w"], exposure: float) -> bytes:

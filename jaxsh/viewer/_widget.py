@@ -10,7 +10,7 @@ from jaxtyping import ArrayLike, Float, Int
 
 from .._core.checks import check_size
 from ..imaging import Camera
-from ..transfer import Transfer
+from ..transfer import Material, Transfer
 from ._lamp import Lamp, checked_place
 from ._lights import checked_lights
 from ._scene import Scene, make_scene
@@ -26,7 +26,7 @@ def view(
     transfer: Transfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
     faces: Int[ArrayLike, "f 3"],
-    albedo: Float[ArrayLike, "..."] = 0.8,
+    albedo: Float[ArrayLike, "..."] | Material = 0.8,
     *,
     camera: Camera | None = None,
     exposure: float | None = None,

@@ -50,7 +50,7 @@ def shaded(light):
 def lit_by(lamp, degree=DEGREE, window="none"):
     _, made, _, albedo = pages.example()
     positions = np.asarray(made.positions, np.float64)
-    grid = midrange.grid_around(positions, (4, 4, 4))
+    grid = midrange.grid_around(positions, (8, 8, 8))
     found = midrange.sphere_harmonics_with_gradient(lamp, grid.points, degree)
     weights = harmonics.window(window, degree)
     terms = midrange.make_expansion(grid.points, *found).terms * weights[None, None, :, None]
@@ -156,4 +156,27 @@ def test_a_lamp_that_was_captured_moves_with_its_light(browser, tmp_path, rng): 
         cast, moved, albedo, weights=grid.weights(positions - shift), rule="half"
     )
     assert apart(page, expected) < 0.1
+    page.context.close()
+
+
+def test_gloss_is_shade_glossy_from_every_eye(browser, tmp_path):  # noqa: F811
+    mesh, made, light, albedo = pages.example()
+    degree, made, light = 4, made.truncated(4), jnp.asarray(light[:, :25])
+    material = transfer.Material(albedo, jnp.array([0.5, 0.4, 0.3]), 12.0)
+    path = tmp_path / "gloss.html"
+    viewer.export_html(path, made, light, mesh.faces, material, exposure=1.0, sky=viewer.Sky())
+    page = opened(browser, path, [])
+    eye = jnp.asarray(page.evaluate("viewer.state.camera.position"), jnp.float32)
+    assert apart(page, transfer.shade_glossy(light, made, eye, material)) < 0.1
+    box = page.locator("canvas").first.bounding_box()
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 190, box["y"] + 60, steps=2)
+    page.mouse.up()
+    page.evaluate("viewer.set({ window: 'hann', lobe: 1, gloss: 1.5 })")
+    moved = jnp.asarray(page.evaluate("viewer.state.camera.position"), jnp.float32)
+    assert abs(moved - eye).max() > 0.2
+    dull = transfer.Material(albedo, 1.5 * material.specular, 2.0)
+    softened = light * harmonics.window("hann", degree)[None].astype(jnp.float32)
+    assert apart(page, transfer.shade_glossy(softened, made, moved, dull)) < 0.1
     page.context.close()

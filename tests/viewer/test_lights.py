@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import viewer_pages as pages
 
-from jaxsh import harmonics, midrange, sky, viewer
+from jaxsh import harmonics, midrange, sky, transfer, viewer
 from jaxsh.viewer import _lights
 
 DEGREE = 6
@@ -44,8 +44,7 @@ def skies():
 
 
 def suns():
-    if importlib.util.find_spec("ephem") is None:
-        # PyEphem's, as in tests/sky: noon in Greenwich, and a morning in Sydney.
+    if importlib.util.find_spec("ephem") is None:  # then nothing is compared
         return []
     times = ["1950-03-21T12:00Z", "2000-01-01T09:30Z", "2026-06-21T04:10Z", "2049-12-21T20:00Z"]
     places = [(51.48, 0.0), (-33.87, 151.2), (78.2, 15.6), (0.0, -70.0)]
@@ -79,10 +78,10 @@ def field(rng):
 
 @pytest.mark.skipif(NODE is None, reason="needs node, which is not here")
 def test_lights_in_javascript_agree_with_python(rng, tmp_path):
-    lights = lights_of(sky=viewer.Sky(scale=1.0), lamp=viewer.Lamp(ball()))
+    grid = midrange.grid_around(np.asarray(pages.example()[1].positions, np.float64), (4, 4, 4))
+    lights = lights_of(sky=viewer.Sky(scale=1.0), lamp=viewer.Lamp(ball(), grid))
     assert lights.kinds == ["sky", "lamp"]
-    positions = np.asarray(pages.example()[1].positions, np.float64)
-    points = np.asarray(midrange.grid_around(positions, (4, 4, 4)).points)
+    points = np.asarray(grid.points)
     c, gradient = midrange.sphere_harmonics_with_gradient(ball(), points, DEGREE)
     whole = np.concatenate(
         [np.asarray(c)[:, :1], np.asarray(gradient[:, 0]).swapaxes(1, 2)], axis=1
@@ -113,3 +112,49 @@ def test_lights_in_javascript_agree_with_python(rng, tmp_path):
     )
     assert run.returncode == 0, run.stdout + run.stderr
     assert "pass 7" in run.stdout
+
+
+def test_what_does_not_fit_is_refused(unchecked):
+    grid = midrange.Grid(np.zeros(3), np.ones(3), (2, 2, 2))
+    fine = midrange.Grid(np.zeros(3), np.ones(3), (9, 8, 8))
+    light = midrange.Expansion(grid.points, np.ones((8, 3, 4, 4)))
+    for message, made in (
+        ("not below the horizon", lambda: viewer.Sky(sun=(1, 0, -0.1))),
+        (r"expected sun as a vector \(3,\)", lambda: viewer.Sky(sun=(0.0, 0.0, 0.0))),
+        ("turbidity must be a number >= 2 and <= 10", lambda: viewer.Sky(turbidity=1.9)),
+        ("expected time with a time zone", lambda: viewer.Sky(time="2026-06-21T10:00")),
+        ("expected time in ISO form", lambda: viewer.Sky(time="noon")),
+        ("expected place as latitude", lambda: viewer.Sky(place=(91.0, 0.0))),
+        ("needs the grid and the position", lambda: viewer.Lamp(light, grid)),
+        ("at the grid's 8 samples", lambda: viewer.Lamp(light.truncated(0), grid, np.ones(3))),
+        ("at most 512 samples", lambda: viewer.Lamp(ball(), fine)),
+        (
+            "expansion of degree 6 or more, got 1",
+            lambda: lights_of(lamp=viewer.Lamp(light, grid, np.ones(3))),
+        ),
+        ("expected a light, a sky or a lamp, got none", lights_of),
+    ):
+        with pytest.raises(ValueError, match=message):
+            made()
+
+
+def test_gloss_that_differs_by_vertex_is_refused(tmp_path):
+    mesh, made, light, albedo = pages.example()
+    material = transfer.Material(albedo, albedo, 8.0)
+    with pytest.raises(ValueError, match="expected a material with one specular albedo"):
+        viewer.export_html(tmp_path / "a.html", made, light, mesh.faces, material)
+
+
+def test_a_sky_is_as_bright_as_the_light_beside_it():
+    _, made, light, _ = pages.example()
+    light = light[:, :49]
+    lights = _lights.make_lights(light, viewer.Sky(), None, made)
+    assert lights.kinds == ["given", "sky"]
+    assert lights.names() == ["Light 1", "Clear sky"]
+    coefficients = np.asarray(made.coefficients, np.float64)[:, :49]
+    means = [(coefficients @ one.T).mean() for one in lights.coefficients]
+    assert means[1] == pytest.approx(means[0], rel=1e-9)
+    known = sky.preetham_harmonics(np.array([0.55, -0.65, 0.53]), 3.0, DEGREE, table="wide")
+    assert lights.facts["sky"]["gain"] > 0
+    alone = lights_of(sky=viewer.Sky(disc=False))
+    np.testing.assert_allclose(alone.coefficients[0], known, rtol=0, atol=1e-12)

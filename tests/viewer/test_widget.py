@@ -10,7 +10,7 @@ import viewer_pages as pages
 from PIL import Image
 from scipy.ndimage import binary_erosion
 
-from jaxsh import imaging, transfer, viewer
+from jaxsh import imaging, midrange, transfer, viewer
 
 
 def widget():
@@ -31,7 +31,7 @@ def test_the_mesh_is_sent_when_asked_for_and_not_kept_in_the_state(monkeypatch):
     assert len(more["buffers"][0]) > 100_000
     state = {key: shown.get_state(key)[key] for key in shown.keys if not key.startswith("_")}
     np.testing.assert_array_equal(state["lights"], light[None].astype(np.float64))
-    assert set(state) == {"lights", "height", "layout", "tabbable", "tooltip"}
+    assert set(state) == {"lights", "moved", "height", "layout", "tabbable", "tooltip"}
 
 
 def test_its_light_can_be_changed_and_no_other_shape():
@@ -73,3 +73,20 @@ def test_without_anywidget_it_says_what_to_install(monkeypatch):
     viewer._widget._widget_class.cache_clear()
     with pytest.raises(ImportError, match=r"pip install 'jaxsh\[viewer\]'"):
         viewer.view(made, light, mesh.faces)
+
+
+def test_sun_and_lamp_are_moved_from_python():
+    pytest.importorskip("anywidget", reason="needs the package anywidget")
+    mesh, made, light, _ = pages.example()
+    ball = midrange.Sphere(np.array([0.0, -2.0, 1.0]), 0.2, np.ones(3))
+    extra = {"sky": viewer.Sky(), "lamp": viewer.Lamp(ball), "exposure": 1.0}
+    shown = viewer.view(made, light[:, :4], mesh.faces, **extra)
+    assert len(shown.light) == 1
+    shown.sun, shown.turbidity, shown.lamp = (3.0, 0.0, 4.0), 5.0, (0.0, -3.0, 0.5)
+    assert shown.moved == {"sun": [0.6, 0.0, 0.8], "turbidity": 5.0, "lamp": [0.0, -3.0, 0.5]}
+    assert shown.sun == [0.6, 0.0, 0.8]
+    with pytest.raises(ValueError, match="turbidity must be a number"):
+        shown.turbidity = 11.0
+    plain, _ = widget()
+    with pytest.raises(ValueError, match="expected a viewer with a sky"):
+        plain.sun = (0.0, 0.0, 1.0)

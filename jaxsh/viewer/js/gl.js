@@ -60,3 +60,18 @@ export function pictureOf(gl, width, height, samples, draw) {
   }
   return result;
 }
+
+// A texture of four floats in each place, bound to a unit.
+export function floatTexture(gl, unit, width, height) {
+  const texture = gl.createTexture();
+  gl.activeTexture(gl.TEXTURE0 + unit);
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, width, height);
+  nearest(gl, gl.TEXTURE_2D);
+  return texture;
+}
+
+export function nearest(gl, target) {
+  gl.texParameteri(target, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texParameteri(target, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+}

@@ -104,7 +104,9 @@ export function basisWithGradient(vector, degree) {
   let first = Math.sqrt(1 / (4 * Math.PI));
   const put = (k, dx, dy, dz) => {
     const along = dx * x + dy * y + dz * z;
-    gradient.set([dx - along * x, dy - along * y, dz - along * z].map((v) => v / length), 3 * k);
+    gradient[3 * k] = (dx - along * x) / length;
+    gradient[3 * k + 1] = (dy - along * y) / length;
+    gradient[3 * k + 2] = (dz - along * z) / length;
   };
   for (let m = 0; m <= degree; m++) {
     let [before, last, slopeBefore, slope] = [0, first, 0, 0];

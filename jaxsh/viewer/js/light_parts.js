@@ -76,7 +76,13 @@ export const lampPart = {
   controls: (viewer) => (viewer.scene.near ? [new LampHandle(viewer)] : []),
 };
 
-const termsOf = (scene, state) => lampTerms(scene.near, scene.nearTerms, state.lamp, scene.degree);
+// The light at the samples, which the picture and the mirror ball both ask for, is kept for a lamp.
+const kept = new WeakMap();
+
+function termsOf(scene, { lamp }) {
+  if (!kept.has(lamp)) kept.set(lamp, lampTerms(scene.near, scene.nearTerms, lamp, scene.degree));
+  return kept.get(lamp);
+}
 
 const RADIANS = Math.PI / 180;
 

@@ -46,9 +46,10 @@ export function ballTerms(point, center, radius, degree) {
     const rise = (2 * Math.PI * last * sine) / (squared * z);
     for (let k = l * l; k < (l + 1) ** 2; k++) {
       terms[k] = band * values[k];
-      away.forEach((along, axis) => {
-        terms[(axis + 1) * count + k] = rise * along * values[k] - band * gradient[3 * k + axis];
-      });
+      for (let axis = 0; axis < 3; axis++) {
+        const turn = band * gradient[3 * k + axis];
+        terms[(axis + 1) * count + k] = rise * away[axis] * values[k] - turn;
+      }
     }
     const next = ((2 * l + 1) * z * last - l * before) / (l + 1);
     const nextSlope = (2 * l + 1) * last + slopeBefore;

@@ -1,4 +1,5 @@
 // Shades each vertex by the light of a lamp near it, on the graphics processor.
+import { floatTexture } from "./gl.js";
 // The grid's trilinear weights, and half of the gradient of each of the eight samples around a vertex
 // (midrange.interpolate, rule "half"). Scales and factors are in the texture: across, four terms of each
 // sample, and downwards layers of four coefficients, channel after channel.
@@ -57,13 +58,7 @@ export class NearShading {
     this.program = renderer.shading(SHADE_NEAR(scene, this.channels));
     const [x, y, z] = scene.near.grid.shape;
     this.size = [4 * x * y * z, this.channels * scene.layers];
-    this.terms = gl.createTexture();
-    gl.activeTexture(gl.TEXTURE0 + TERMS_UNIT);
-    gl.bindTexture(gl.TEXTURE_2D, this.terms);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, ...this.size);
-    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
-      gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
-    }
+    this.terms = floatTexture(gl, TERMS_UNIT, ...this.size);
     gl.activeTexture(gl.TEXTURE0);
   }
 

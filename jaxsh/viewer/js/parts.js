@@ -1,4 +1,5 @@
 // What a light can have beyond its coefficients: each part is a file of its own.
+import { glossyPart } from "./glossy_part.js";
 import { lampPart, skyPart, windowPart } from "./light_parts.js";
 
 // A part may have
@@ -8,6 +9,7 @@ import { lampPart, skyPart, windowPart } from "./light_parts.js";
 // - `light(coefficients, state, scene)`: other coefficients, three arrays, of those that shade;
 // - `shade(renderer, coefficients, state, side, scene)`: shades instead of `Renderer.shade`, and
 //   returns true where it did;
+// - `seesCamera(scene)`: whether the camera changes its shading;
 // - `turn(rotation, state, scene)`: what of the state a rotation of the light changes instead of
 //   `rotation`, the rotation of its coefficients; nothing where it does not.
-export const PARTS = [skyPart, lampPart, windowPart];
+export const PARTS = [skyPart, lampPart, glossyPart, windowPart];

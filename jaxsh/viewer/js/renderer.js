@@ -55,7 +55,7 @@ void main() {
 }`;
 
 // Attributes of shading, and of drawing.
-const SHADED = { albedo: 0, position: 1 };
+const SHADED = { albedo: 0, position: 1, normal: 2 };
 export const POSITION = 0;
 export const RADIANCE = 1;
 
@@ -130,12 +130,25 @@ export class Renderer {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.positions);
     gl.enableVertexAttribArray(SHADED.position);
     gl.vertexAttribPointer(SHADED.position, 3, gl.FLOAT, false, 0, 0);
+    if (scene.normals) {
+      fill(gl, gl.ARRAY_BUFFER, gl.createBuffer(), scene.normals);
+      gl.enableVertexAttribArray(SHADED.normal);
+      gl.vertexAttribPointer(SHADED.normal, 3, gl.FLOAT, false, 0, 0);
+    }
     gl.bindVertexArray(null);
   }
 
   // Computes every vertex's radiance of a side from a light, three arrays of K coefficients.
   shade(light, side = 0) {
-    const { gl, scene } = this;
+    const { gl } = this;
+    gl.useProgram(this.shadeProgram);
+    gl.uniform4fv(this.lightAt, this.scaled(light));
+    this.run(side);
+  }
+
+  // The light as shading programs take it, times all that the codes of the transfer lack.
+  scaled(light) {
+    const { scene } = this;
     const sent = new Float32Array(12 * scene.layers);
     for (let channel = 0; channel < 3; channel++) {
       for (let k = 0; k < scene.scales.length; k++) {
@@ -143,30 +156,34 @@ export class Renderer {
         sent[place] = (light[channel][k] * scene.scales[k] * scene.albedo[channel]) / Math.PI;
       }
     }
-    gl.useProgram(this.shadeProgram);
-    gl.uniform4fv(this.lightAt, sent);
-    this.run(side);
+    return sent;
   }
 
-  // A program that shades: from `position` and `albedo` of a vertex it makes the `radiance`.
-  shading(source) {
-    return program(this.gl, source, NOTHING, SHADED, ["radiance"]);
+  // A program that shades: from `position`, `normal` and `albedo` of a vertex it makes the `radiance`,
+  // or other outputs.
+  shading(source, outputs = ["radiance"]) {
+    return program(this.gl, source, NOTHING, SHADED, outputs);
   }
 
   // Runs the shading program in use for the vertices of a side.
   run(side) {
+    this.capture([this.sides[side].radiance]);
+  }
+
+  // The same, each output into a buffer.
+  capture(buffers) {
     const { gl, scene } = this;
     gl.bindVertexArray(this.shadeArrays);
     if (!scene.albedoCodes) gl.vertexAttrib3f(SHADED.albedo, 1, 1, 1);
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
-    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, this.sides[side].radiance);
+    buffers.forEach((buffer, i) => gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, i, buffer));
     gl.enable(gl.RASTERIZER_DISCARD);
     gl.beginTransformFeedback(gl.POINTS);
     gl.drawArrays(gl.POINTS, 0, scene.positions.length / 3);
     gl.endTransformFeedback();
     gl.disable(gl.RASTERIZER_DISCARD);
-    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, null);
+    buffers.forEach((_, i) => gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, i, null));
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, null);
     gl.bindVertexArray(null);
   }

@@ -69,6 +69,7 @@ export class Viewer {
     for (const [name, value] of Object.entries(some)) {
       const ofLight = name in this.sides[0];
       shades ||= ofLight || name === "rotation" || name === "compare";
+      shades ||= name === "camera" && PARTS.some((part) => part.seesCamera?.(this.scene));
       if (ofLight) this.sides[this.side] = { ...this.sides[this.side], [name]: value };
       else this.shared = { ...this.shared, [name]: value };
     }

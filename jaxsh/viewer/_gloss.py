@@ -1,0 +1,42 @@
+"""Gloss: what the page needs to shade as `transfer.shade_glossy` does."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from ..transfer import Material
+from ..transfer._glossy_kernels import lobe_polynomial, product_nodes
+
+# What the menu offers besides the material's own; beyond that a lobe of degree 10 hardly changes.
+_EXPONENTS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
+
+
+def split_material(albedo: Any) -> tuple[Float[ArrayLike, "..."], Material | None]:
+    """Split off the diffuse albedo; raises `ValueError` for gloss that differs by vertex."""
+    if not isinstance(albedo, Material):
+        return albedo, None
+    if albedo.specular.ndim > 1 or albedo.exponent.ndim:
+        raise ValueError(
+            "expected a material with one specular albedo, a number or (3,), and one exponent, got "
+            f"shapes {albedo.specular.shape} and {albedo.exponent.shape}"
+        )
+    return albedo.diffuse, albedo
+
+
+def gloss_facts(material: Material, degree: int) -> dict[str, Any]:
+    """List directions, their weights, and the lobe's polynomials, for the header."""
+    nodes = product_nodes(degree)
+    own = float(material.exponent)
+    exponents = sorted({*_EXPONENTS, own})
+    lobes = lobe_polynomial(jnp.asarray(exponents, jnp.result_type(float)), degree, True)
+    weights = nodes.project[0] / nodes.basis[:, 0]
+    return {
+        "specular": np.broadcast_to(np.asarray(material.specular, np.float64), 3).tolist(),
+        "exponents": exponents,
+        "first": exponents.index(own),
+        "nodes": nodes.directions.tolist(),
+        "weights": weights.tolist(),
+        "lobes": np.asarray(lobes, np.float64).T.tolist(),
+    }
