@@ -37,8 +37,8 @@ class Lamp:
       the samples of `grid`, which is sent once and moves with its lamp. With the second, blockers
       that were captured move along.
     - `grid`: by default that of `midrange.grid_around` the mesh with 8 × 8 × 8 samples, and never
-      more than these 512. An expansion needs its own; the lamp can be dragged as far as the grid holds
-      the mesh.
+      more than these 512. An expansion needs its own; the lamp can be dragged as far as the grid
+      holds the mesh.
     - `position`: (3,), where the lamp is: by default the sphere's center. An expansion needs it.
 
     Raises `ValueError` for shapes that do not fit and a missing grid or position.
