@@ -6,8 +6,11 @@ from collections.abc import Sequence
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogFormatter, StrMethodFormatter
 
 from .._core.checks import check_all, check_type
 from ._colors import ColorScale
@@ -66,38 +69,47 @@ def _new_panels(shape: tuple[int, ...], size: tuple[float, float]) -> np.ndarray
 def color_bar(axes: Axes | Sequence[Axes], scale: ColorScale, label: str, **options) -> None:
     """Draw a bar beside the axes, from which it takes the room."""
     one = axes if isinstance(axes, Axes) else axes[0]
-    one.figure.colorbar(
+    bar = one.figure.colorbar(
         ScalarMappable(scale.norm, scale.cmap),
         ax=axes if isinstance(axes, Axes) else list(axes),
         label=label,
         extend=scale.extend,
         **{"fraction": 0.046, "pad": 0.03} | options,
     )
+    if isinstance(scale.norm, LogNorm):
+        plain_logarithm(bar.ax.yaxis)
 
 
-def length_bar(ax: Axes, per_length: float, said: str, unit: str) -> None:
-    """Draw a bar of a round length below the picture's right half; one length is so many of x."""
-    left, right = sorted(ax.get_xlim())
-    length = _round_down(0.3 * (right - left) / per_length)
+def plain_logarithm(axis: Axis) -> None:
+    """Label a logarithmic axis with plain numbers, between the powers of ten where they are few."""
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(2, 0.4)))
+
+
+def length_bar(ax: Axes, per_length: float, said: str, unit: str, *, left: bool = False) -> None:
+    """Draw a bar of a round length below the picture's corner; one length is so many of x."""
+    first, last = sorted(ax.get_xlim())
+    length = round_down(0.3 * (last - first) / per_length)
     color = matplotlib.rcParams["text.color"]
     place = ax.get_xaxis_transform()  # x as in the picture, y as a share of the axes
-    start = right - length * per_length
+    start = first if left else last - length * per_length
+    end = start + length * per_length
     ax.add_artist(
-        Line2D([start, right], [-0.03, -0.03], color=color, lw=2, transform=place, clip_on=False)
+        Line2D([start, end], [-0.03, -0.03], color=color, lw=2, transform=place, clip_on=False)
     )
     ax.text(
-        right,
+        start if left else end,
         -0.05,
         f"{said}{length:g} {unit}".strip(),
         transform=place,
-        ha="right",
+        ha="left" if left else "right",
         va="top",
         color=color,
         fontsize="small",
     )
 
 
-def _round_down(value: float) -> float:
+def round_down(value: float) -> float:
     """Find the largest of 1, 2 and 5 times a power of ten that is not above the value."""
     power = 10.0 ** math.floor(math.log10(value))
     return max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-9))

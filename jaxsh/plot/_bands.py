@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogFormatter, MaxNLocator, StrMethodFormatter
+from matplotlib.ticker import MaxNLocator
 
 from .._core.checks import check_type
 from ..harmonics import degree_of, degrees
 from ._arrays import check_labels, read_coefficients
-from ._axes import flat_axes
+from ._axes import flat_axes, plain_logarithm
 from ._colors import CHANNELS
 
 _MARKERS = "os^Dv"
@@ -70,8 +70,7 @@ def bands(
         )
     if np.any(functions):
         ax.set_yscale("log")
-        ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        ax.yaxis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(2, 0.4)))
+        plain_logarithm(ax.yaxis)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_xlabel("degree l")
     ax.set_ylabel(f"power Σₘ cₗₘ², in {unit}")

@@ -14,7 +14,7 @@ from ..imaging import Camera, Raster, interpolate, rasterize
 from ._axes import flat_axes, length_bar
 
 _SIZE = 480  # pixels of a picture whose camera is not said
-_SAMPLES = 2
+SAMPLES = 2
 _MARGIN = 0.04  # around what is seen, of the picture's width
 
 
@@ -32,10 +32,17 @@ class Surface(NamedTuple):
         seen = np.asarray(interpolate(self.raster, jnp.asarray(values)))
         return seen / np.where(self.alpha > 0, self.alpha, 1).astype(seen.dtype)[..., None]
 
-    def show(self, colors: Float[np.ndarray, "h w 3"], ax: Axes | None, unit: str) -> Axes:
-        """Draw RGB on axes without a frame, with a bar of length."""
+    def show(
+        self,
+        colors: Float[np.ndarray, "h w 3"],
+        ax: Axes | None,
+        unit: str,
+        over: Float[np.ndarray, "h w 4"] | None = None,
+    ) -> Axes:
+        """Draw RGB, and RGBA `over` it, on axes without a frame, with a bar of length."""
         height, width = self.alpha.shape
-        rows, columns = (np.flatnonzero(self.alpha.any(axis=axis)) for axis in (1, 0))
+        covered = self.alpha if over is None else self.alpha + over[..., 3]
+        rows, columns = (np.flatnonzero(covered.any(axis=axis)) for axis in (1, 0))
         box = [0, width, height, 0]  # left, right, bottom, top
         if self.cropped:
             free = _MARGIN * width
@@ -44,36 +51,46 @@ class Surface(NamedTuple):
         scale = 4.5 / max(wide, high)
         ax = flat_axes(ax, (scale * wide + 0.8, scale * high + 0.5))
         picture = np.concatenate([np.clip(colors, 0, 1), self.alpha[..., None]], axis=-1)
-        ax.imshow(picture, extent=(0, width, height, 0), aspect="equal")
+        for layer in (picture,) if over is None else (picture, over):
+            ax.imshow(layer, extent=(0, width, height, 0), aspect="equal")
         ax.set(xlim=box[:2], ylim=box[2:])
         ax.set_axis_off()
         length_bar(ax, self.per_length, "", unit)
         return ax
 
 
-def see(mesh: Mesh, camera: Camera | None) -> Surface:
+def see(mesh: Mesh, camera: Camera | None, margin: float = 0.05) -> Surface:
     """Rasterize a mesh; by default from its front, in a picture cut to the mesh."""
-    check_type("mesh", mesh, Mesh)
-    if camera is not None:
-        check_type("camera", camera, Camera)
-    view = Camera.facing(mesh, width=_SIZE, height=_SIZE) if camera is None else camera
-    raster = rasterize(mesh, view, samples=_SAMPLES)
-    alpha = np.asarray(raster.alpha)
-    if not alpha.any():
+    view = camera_for(mesh, camera, margin)
+    raster = rasterize(mesh, view, samples=SAMPLES)
+    if not (np.asarray(raster.face) >= 0).any():
         raise ValueError("expected a camera that sees the mesh, got one with an empty picture")
-    position, target = (np.asarray(one, np.float64) for one in (view.position, view.target))
+    return facing_of(mesh, view, raster)._replace(cropped=camera is None)
+
+
+def camera_for(mesh: Mesh, camera: Camera | None, margin: float = 0.05) -> Camera:
+    """Check the camera, or place one in front of the mesh."""
+    check_type("mesh", mesh, Mesh)
+    if camera is None:
+        return Camera.facing(mesh, width=_SIZE, height=_SIZE, margin=margin)
+    check_type("camera", camera, Camera)
+    return camera
+
+
+def facing_of(mesh: Mesh, camera: Camera, raster: Raster) -> Surface:
+    """Compute how surfaces face their camera, and how large they are there."""
+    alpha = np.asarray(raster.alpha)
+    position, target = (np.asarray(one, np.float64) for one in (camera.position, camera.target))
     forward = (target - position) / np.linalg.norm(target - position)
     toward = position - np.asarray(mesh.vertices, np.float64)
-    depths = -toward @ forward
     normals = np.asarray(mesh.normals, np.float64)
     cosine = (toward * normals).sum(axis=1) / np.linalg.norm(toward, axis=1)
-    seen = np.asarray(
-        interpolate(raster, jnp.asarray(np.stack([cosine, depths], axis=1), jnp.float32))
-    )
-    focal = view.height / 2 / math.tan(math.radians(float(view.fov_y)) / 2)
-    depth = float(seen[..., 1].sum() / alpha.sum())
+    carried = np.stack([cosine, -toward @ forward], axis=1)
+    seen = np.asarray(interpolate(raster, jnp.asarray(carried, jnp.float32)))
+    focal = camera.height / 2 / math.tan(math.radians(float(camera.fov_y)) / 2)
+    depth = float(seen[..., 1].sum() / alpha.sum()) if alpha.any() else math.inf
     facing = seen[..., 0] / np.where(alpha > 0, alpha, 1)
-    return Surface(raster, alpha, np.clip(facing, 0, 1), focal / depth, camera is None)
+    return Surface(raster, alpha, np.clip(facing, 0, 1), focal / depth, False)
 
 
 def relieved(

@@ -1,6 +1,7 @@
 """Valid calls of `jaxsh.plot`."""
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from jaxsh import imaging, plot
 
@@ -9,10 +10,11 @@ from .shared import floats, knot, of
 
 def calls():
     p, one = plot, np.array([[1.0, 0.0, 3.0, 4.0]])
+    ax = Figure().add_subplot()
     camera = imaging.Camera.facing(knot(), width=6, height=8)
     toward = np.array([0.0, -1.0, 0.0])
     tone = {"exposure": 1.0, "curve": "clip", "white": 2.0}
-    panels = {"coefficients": one, "ax": None, "finite": "coefficients", "slow": True}
+    panels = {"coefficients": one, "ax": ax, "finite": "coefficients", "slow": True}
     return {
         "ball": of(
             p.ball,
@@ -21,7 +23,7 @@ def calls():
             toward=toward,
             **tone,
             resolution=4,
-            ax=None,
+            ax=ax,
             finite="light toward",
             slow=True,
         ),
@@ -31,14 +33,20 @@ def calls():
             unit="",
             toward=toward,
             resolution=4,
-            ax=None,
+            ax=ax,
             finite="light toward",
             free="unit",
             slow=True,
         ),
-        "bands": of(p.bands, labels=["f"], unit="f² · sr", free="unit", **panels),
+        "bands": of(
+            p.bands,
+            labels=["f"],
+            unit="f² · sr",
+            free="unit",
+            **panels | {"ax": Figure().add_subplot()},  # logarithmic from then on
+        ),
         "basis": of(
-            p.basis, degree=1, toward=toward, resolution=4, ax=None, finite="toward", slow=True
+            p.basis, degree=1, toward=toward, resolution=4, ax=ax, finite="toward", slow=True
         ),
         "coefficients": of(
             p.coefficients,
@@ -50,7 +58,57 @@ def calls():
             free="label",
             **panels,
         ),
-        "light": of(p.light, light=one, height=4, exposure=1.0, ax=None, finite="light", slow=True),
+        "dome": of(
+            p.dome,
+            sky=one,
+            label="luminance, kcd/m²",
+            suns=toward,
+            projection="equidistant",
+            limits=2.0,
+            log=False,
+            **tone,
+            resolution=4,
+            colorbar=True,
+            ax=ax,
+            finite="sky suns",
+            free="label suns",
+            slow=True,
+        ),
+        "error_map": of(
+            p.error_map,
+            errors=floats(2, 3),
+            x=np.arange(3.0),
+            y=np.arange(2.0),
+            label="error, %",
+            x_label="elevation, °",
+            y_label="turbidity",
+            limits=2.0,
+            log=False,
+            numbers=True,
+            colorbar=True,
+            ax=ax,
+            finite="errors x y",
+            free="label x_label y_label",
+            slow=True,
+        ),
+        "gradients": of(
+            p.gradients,
+            points=floats(4, 3),
+            gradient=floats(4, 3),
+            values=floats(4),
+            label="radiance",
+            unit="1/m",
+            plane="xy",
+            mesh=None,
+            limits=2.0,
+            length="m",
+            colorbar=True,
+            ax=ax,
+            finite="points gradient values",
+            free="label unit length values",
+            slow=True,
+        ),
+        "light": of(p.light, light=one, height=4, exposure=1.0, ax=ax, finite="light", slow=True),
         "lobes": of(
             p.lobes,
             titles=["f"],
@@ -68,9 +126,24 @@ def calls():
             camera=camera,
             **tone,
             length="m",
-            ax=None,
+            ax=ax,
             finite="radiance",
             free="length camera",
+            slow=True,
+        ),
+        "transfer_lobes": of(
+            p.transfer_lobes,
+            mesh=knot(),
+            coefficients=floats(300, 4),
+            vertices=None,
+            count=2,
+            size=0.1,
+            unit="",
+            camera=camera,
+            length="m",
+            ax=ax,
+            finite="coefficients size",
+            free="unit length camera",
             slow=True,
         ),
         "vertices": of(
@@ -85,7 +158,7 @@ def calls():
             relief=0.2,
             length="m",
             colorbar=True,
-            ax=None,
+            ax=ax,
             finite="values relief",
             free="values label length camera",
             slow=True,
