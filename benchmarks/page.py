@@ -173,13 +173,13 @@ def by_degree(basis: list[dict[str, Any]], dtype: str, key: str, digits: int) ->
     lines = []
     for quantity in QUANTITIES:
         for count in sorted({row["count"] for row in basis}):
-            for cores, words in CORES.items():
+            for cores in CORES:
                 wanted = {"dtype": dtype, "quantity": quantity, "count": count, "cores": cores}
                 found = {row["degree"]: row.get(key) for row in matching(basis, wanted)}
                 if found:
                     shown = [number(found.get(degree), digits) for degree in degrees]
-                    lines.append([quantity, f"{count:,}", words, *shown])
-    return table(["quantity", "directions", "cores", *(f"degree {d}" for d in degrees)], lines)
+                    lines.append([quantity, f"{count:,}", cores, *shown])
+    return table(["quantity", "directions", "cores", f"degree {degrees[0]}", *degrees[1:]], lines)
 
 
 def table(heads: Sequence[str], lines: Sequence[Sequence[Any]]) -> str:
