@@ -38,7 +38,7 @@ def html(chapters: Sequence[Chapter], command: str, date: str) -> str:
             f'<section id="{_anchor(f"paper {chapter.paper.folder.name}")}">',
             f"<h2>{_text(chapter.paper.title)}</h2>",
             f'<p class="facts">{_text(chapter.paper.cited)}</p>',
-            *_claims(chapter.verdicts, here),
+            *_claims(chapter, here),
         ]
         for entry, run in chapter.runs:
             if run is None:
@@ -74,19 +74,16 @@ def _summary(chapters: Sequence[Chapter]) -> Iterator[str]:
     yield "</tbody></table>"
 
 
-def _claims(verdicts: Sequence[Verdict], here: Collection[str]) -> Iterator[str]:
-    if not verdicts:
+def _claims(chapter: Chapter, here: Collection[str]) -> Iterator[str]:
+    if not chapter.verdicts:
         return
     yield '<table class="claims"><thead><tr><th>claim</th><th>bound</th><th>measured</th>'
     yield "<th>verdict</th><th>from</th></tr></thead><tbody>"
-    for verdict in verdicts:
+    for verdict in chapter.verdicts:
         claim = verdict.claim
         kind = verdict.holds.replace(" ", "-")
         folded = f"<details><summary>note</summary>{_text(claim.note)}</details>"
-        links = ", ".join(
-            f'<a href="#{_anchor(name)}">{_text(name)}</a>' if name in here else _text(name)
-            for name in claim.experiments
-        )
+        links = ", ".join(_link(name, chapter, here) for name in claim.experiments)
         yield (
             f'<tr class="{kind}"><td>{_text(claim.says)} <span class="where">'
             f"{_text(claim.where)}</span>{folded if claim.note else ''}</td>"
@@ -99,8 +96,14 @@ def _claims(verdicts: Sequence[Verdict], here: Collection[str]) -> Iterator[str]
     yield "</tbody></table>"
 
 
+def _link(name: str, chapter: Chapter, here: Collection[str]) -> str:
+    """To an experiment on this page, by its name within the paper's folder."""
+    short = _text(name.removeprefix(f"{chapter.paper.folder.name}.")).replace(".", ".<wbr>")
+    return f'<a href="#{_anchor(name)}">{short}</a>' if name in here else short
+
+
 def _preset(verdict: Verdict) -> str:
-    return f" preset {_text(verdict.preset)}" if verdict.preset else ""
+    return f" <br>preset {_text(verdict.preset)}" if verdict.preset else ""
 
 
 def _head(entry: Entry, run: Run) -> Iterator[str]:

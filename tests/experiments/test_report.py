@@ -1,10 +1,11 @@
 """The page over all results, its verdicts, and what it says of missing and stale ones."""
 
 import html.parser
+import os
 import re
+import shutil
 
 import jax
-import pages
 import pytest
 
 from experiments.runner import Column, Table, UserError
@@ -14,6 +15,7 @@ from experiments.runner.registry import entries
 from experiments.runner.report import to_markdown
 from experiments.runner.results import Shown, _tables, in_view
 
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium")
 PAPER = """\
 title = "On Toys"
 cited = "Nobody 1900"
@@ -64,7 +66,7 @@ class Page(html.parser.HTMLParser):
         values = dict(attrs)
         self.addresses += [values[key] for key in ("href", "src") if key in values]
         self.ids += [values["id"]] if "id" in values else []
-        if tag not in ("meta", "img", "input"):
+        if tag not in ("meta", "img", "input", "br", "wbr"):
             self.open.append(tag)
 
     def handle_endtag(self, tag):
@@ -317,7 +319,7 @@ def test_numbers_tell_rows_apart_where_texts_do_not():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(pages.chromium() is None, reason="needs Chromium, which is not here")
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium, which is not here")
 def test_in_a_browser_the_page_fits_and_shows_the_rest_on_demand(toy_paper):
     playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
     toy_paper.run("toy")
@@ -328,7 +330,7 @@ def test_in_a_browser_the_page_fits_and_shows_the_rest_on_demand(toy_paper):
     report(toy_paper)
     asked = []
     with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=pages.chromium(), args=["--no-sandbox"])
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for width in (1280, 390):
             page = browser.new_page(viewport={"width": width, "height": 800})
             page.on("request", lambda one: asked.append(one.url))
