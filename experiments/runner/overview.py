@@ -79,11 +79,18 @@ def write_pages(chapters: Sequence[Chapter], out: Path, command: str) -> list[Pa
     """Write ``report.html`` and ``report.md`` into the folder of results."""
     from . import page, page_markdown
 
-    out.mkdir(parents=True, exist_ok=True)
     date = datetime.datetime.now(datetime.UTC).date().isoformat()
     paths = [out / "report.html", out / "report.md"]
-    write(paths[0], page.html(chapters, command, date))
-    write(paths[1], page_markdown.markdown(chapters, out, command, date))
+    texts = (
+        page.html(chapters, command, date),
+        page_markdown.markdown(chapters, out, command, date),
+    )
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for path, text in zip(paths, texts, strict=True):
+            write(path, text)
+    except OSError as error:
+        raise UserError(f"cannot write to {str(out)!r}: {error.strerror}") from None
     return paths
 
 

@@ -191,6 +191,13 @@ def test_mistakes(toys, words, sentence):
     assert sentence in toys.refused("report", "--out", str(toys.out), *words)
 
 
+def test_a_folder_that_cannot_be_written(toys):
+    toys.out.write_text("a file")
+    code, _, stderr = toys("report", "toy", "--out", str(toys.out))
+    assert code == 2
+    assert "error: cannot write to" in stderr
+
+
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
@@ -264,9 +271,7 @@ def test_a_number_that_is_none_does_not_hold():
 def test_claims_of_the_papers_name_experiments_and_notes_are_sentences():
     known = entries()
     for folder in {entry.path.parent for entry in known.values()}:
-        paper = read(folder)
-        assert paper.claims, folder
-        for claim in paper.claims:
+        for claim in read(folder).claims:
             assert set(claim.experiments) <= set(known)
             assert claim.says.endswith(".")
             assert claim.where
