@@ -1,8 +1,8 @@
-"""Make the page and the picture of `docs/viewer.md`: a knot under three lights.
+"""Make the page and the pictures of `docs/viewer.md`: a knot under three lights.
 
 python tools/make_viewer_example.py docs
 
-The picture needs the package playwright and a Chromium that is installed; `CHROMIUM=path` names
+The pictures need the package playwright and a Chromium that is installed; `CHROMIUM=path` names
 one.
 """
 
@@ -59,7 +59,7 @@ def values_of(mesh: geometry.Mesh, baked: transfer.Transfer, light: ArrayLike) -
     }
 
 
-def make_picture(page: Path, path: Path) -> None:
+def make_pictures(page: Path, folder: Path) -> None:
     from playwright.sync_api import sync_playwright
 
     chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
@@ -69,12 +69,16 @@ def make_picture(page: Path, path: Path) -> None:
         shown = browser.new_page(viewport={"width": 960, "height": 540})
         shown.goto(page.resolve().as_uri())
         shown.locator("main canvas").first.wait_for()
-        shown.wait_for_timeout(500)
-        shown.screenshot(path=path)
+        for name, light in (("viewer", 0), ("viewer-lamp", 3)):
+            shown.evaluate(
+                "(index) => document.getElementById('viewer').viewer.set({ index })", light
+            )
+            shown.wait_for_timeout(500)
+            shown.screenshot(path=folder / f"{name}.png")
         browser.close()
 
 
 if __name__ == "__main__":
     docs = Path(sys.argv[1])
     make_page(docs / "examples" / "viewer.html")
-    make_picture(docs / "examples" / "viewer.html", docs / "images" / "viewer.png")
+    make_pictures(docs / "examples" / "viewer.html", docs / "images")

@@ -7,7 +7,18 @@ from importlib.resources import files
 # Each after those that it imports from.
 _MODULES = (
     *("harmonics", "vectors", "scene", "gl", "controls", "sky", "near", "factors", "near_shading"),
-    *("handle", "light_parts", "glossy", "glossy_part", "parts", "ball", "pointer", "view", "save"),
+    *(
+        "handle",
+        "sun_handle",
+        "light_parts",
+        "glossy",
+        "glossy_part",
+        "parts",
+        "ball",
+        "pointer",
+        "view",
+        "save",
+    ),
     *("ramp", "color_bar", "picking", "python_text", "overlay", "panel", "renderer", "false_color"),
     *("lobe", "viewer"),
 )

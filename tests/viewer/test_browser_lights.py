@@ -10,7 +10,7 @@ import viewer_pages as pages
 from test_browser import CHROMIUM, browser, colors, levels, opened  # noqa: F401
 from test_lights import DEGREE, ball
 
-from jaxsh import harmonics, midrange, sky, transfer, viewer
+from jaxsh import harmonics, imaging, midrange, sky, transfer, viewer
 
 pytestmark = [
     pytest.mark.slow,
@@ -33,6 +33,15 @@ def page(browser, file):  # noqa: F811
     yield page
     page.context.close()
     assert faults == []
+
+
+def drag(page, handle, x: float, y: float) -> None:
+    box = handle.bounding_box()
+    middle = box["x"] + box["width"] / 2, max(box["y"] + box["height"] / 2, 5)
+    page.mouse.move(*middle)
+    page.mouse.down()
+    page.mouse.move(x, y, steps=2)
+    page.mouse.up()
 
 
 def apart(page, expected) -> float:
@@ -76,13 +85,22 @@ def test_the_sun_is_dragged_and_set_by_date_and_place(page):
     before = np.array(page.evaluate("viewer.state.sun"))
     box = page.locator(".jaxsh-ball").first.bounding_box()
     x, y = box["x"] + 40, box["y"] + 40
-    page.mouse.move(x, y)
+    page.mouse.move(x - 20, y + 20)
     page.mouse.down()
-    page.mouse.move(x + 30, y, steps=2)
+    page.mouse.move(x + 10, y + 20, steps=2)
     page.mouse.up()
     after = np.array(page.evaluate("viewer.state.sun"))
     assert after[2] == pytest.approx(before[2])  # around the vertical
     assert np.degrees(np.arccos(before @ after)) > 3
+    drag(page, page.get_by_role("button", name="Sun:"), x - 20, y + 10)
+    facts = page.evaluate("viewer.scene.camera")
+    camera = imaging.Camera(*(np.array(facts[key]) for key in ("position", "target", "up")))
+    across, up, forward = np.array(camera._axes())
+    normal = -0.5 * across - 0.25 * up - np.sqrt(1 - 0.5**2 - 0.25**2) * forward
+    mirrored = forward - 2 * (forward @ normal) * normal
+    mirrored = np.where([False, False, mirrored[2] < 0], 0, mirrored)  # not below the horizon
+    mirrored /= np.linalg.norm(mirrored)
+    assert np.array(page.evaluate("viewer.state.sun")) @ mirrored > np.cos(np.radians(2))
     page.get_by_label("Latitude").fill("-33.87")
     page.get_by_label("Longitude").fill("151.2")
     page.get_by_label("Date").fill("2026-06-21")
@@ -105,11 +123,7 @@ def test_a_lamp_shades_as_midrange_does_and_is_dragged(page):
     page.evaluate("viewer.set({ degree: 6, window: 'none' })")
     lamp = page.get_by_role("button", name="Lamp")
     box = lamp.bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(x, max(y, 5))
-    page.mouse.down()
-    page.mouse.move(x + 60, max(y, 5) + 10, steps=2)
-    page.mouse.up()
+    drag(page, lamp, box["x"] + box["width"] / 2 + 60, max(box["y"] + box["height"] / 2, 5) + 10)
     place = np.array(page.evaluate("viewer.state.lamp"))
     assert np.linalg.norm(place - np.asarray(ball().center)) > 0.1
     moved = midrange.Sphere(jnp.asarray(place), ball().radius, ball().radiance)

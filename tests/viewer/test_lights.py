@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 import viewer_pages as pages
 
-from jaxsh import harmonics, midrange, sky, transfer, viewer
-from jaxsh.viewer import _lights
+from jaxsh import geometry, harmonics, midrange, sky, transfer, viewer
+from jaxsh.viewer import _lamp, _lights
 
 DEGREE = 6
 NODE = shutil.which("node")
@@ -158,3 +158,18 @@ def test_a_sky_is_as_bright_as_the_light_beside_it():
     assert lights.facts["sky"]["gain"] > 0
     alone = lights_of(sky=viewer.Sky(disc=False))
     np.testing.assert_allclose(alone.coefficients[0], known, rtol=0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_lamp_of_512_samples_errs_by_a_hundredth():
+    mesh = geometry.knot(1500)
+    made = transfer.unshadowed(mesh.vertices, mesh.normals, DEGREE)
+    near = midrange.Sphere(jnp.array([0.6, -0.85, 0.6]), jnp.array(0.1), jnp.ones(3))
+    exact = transfer.shade_diffuse(
+        midrange.sphere_harmonics(near, mesh.vertices, DEGREE), made, 1.0
+    )
+    found = _lamp.lamp_radiance(viewer.Lamp(near), made, DEGREE, 1.0)
+    share = np.sqrt(((found - exact) ** 2).mean() / (exact**2).mean())
+    assert share < 0.011  # 0.0096
+    distance = np.linalg.norm(np.asarray(mesh.vertices) - [0.6, -0.85, 0.6], axis=1).min()
+    assert distance < 0.44 * 1.0515  # of the mesh's radius

@@ -4,7 +4,8 @@ import { factorsOf, scaledBy } from "./factors.js";
 import { LampHandle } from "./handle.js";
 import { interpolated, keptNear, lampTerms } from "./near.js";
 import { NearShading } from "./near_shading.js";
-import { keptUp, skyLight, sunAt } from "./sky.js";
+import { bearingOf, heightOf, keptUp, skyLight, sunAt, sunFrom } from "./sky.js";
+import { SunHandle } from "./sun_handle.js";
 import { apply, minus, plus } from "./vectors.js";
 
 const numCoefficients = (scene) => (scene.degree + 1) ** 2;
@@ -84,18 +85,8 @@ function termsOf(scene, { lamp }) {
   return kept.get(lamp);
 }
 
-const RADIANS = Math.PI / 180;
-
 function skyControls(viewer) {
   const { range } = viewer.scene.sky;
-  const height = ([x, y, z]) => Math.atan2(z, Math.hypot(x, y)) / RADIANS;
-  // From north over east, as on a compass; one that stands in the zenith keeps the north.
-  const bearing = ([x, y]) => (Math.atan2(x, y) / RADIANS + 360) % 360;
-  const sunFrom = (up, around) => {
-    const [s, c] = [Math.sin(around * RADIANS), Math.cos(around * RADIANS)];
-    const across = Math.cos(up * RADIANS);
-    return [across * s, across * c, Math.sin(up * RADIANS)];
-  };
   const placed = (changes) => {
     const { time, latitude, longitude } = { ...viewer.state, ...changes };
     viewer.set({ ...changes, sun: sunAt(time, latitude, longitude) });
@@ -103,14 +94,15 @@ function skyControls(viewer) {
   const degrees = (x) => `${x.toFixed(0)}°`;
   const shown = (control, read) => ({ ...control, show: (state) => control.set(read(state)) });
   const controls = [
+    new SunHandle(viewer),
     shown(slider("Sun above the horizon", {
       min: 0, max: 90, step: 1, value: 0, said: degrees,
-      changed: (up) => viewer.set({ sun: sunFrom(up, bearing(viewer.state.sun)) }),
-    }), ({ sun }) => height(sun)),
+      changed: (up) => viewer.set({ sun: sunFrom(up, bearingOf(viewer.state.sun)) }),
+    }), ({ sun }) => heightOf(sun)),
     shown(slider("Sun's bearing from north", {
       min: 0, max: 360, step: 1, value: 0, said: degrees,
-      changed: (around) => viewer.set({ sun: sunFrom(Math.max(0, height(viewer.state.sun)), around) }),
-    }), ({ sun }) => bearing(sun)),
+      changed: (around) => viewer.set({ sun: sunFrom(Math.max(0, heightOf(viewer.state.sun)), around) }),
+    }), ({ sun }) => bearingOf(sun)),
     shown(slider("Turbidity (haze)", {
       min: range[0], max: range[1], step: 0.1, value: range[0], said: (x) => x.toFixed(1),
       changed: (turbidity) => viewer.set({ turbidity }),

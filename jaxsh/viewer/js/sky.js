@@ -123,6 +123,21 @@ export function sunAt(time, latitude, longitude) {
   ];
 }
 
+const RADIANS = Math.PI / 180;
+
+// Degrees of a sun above the horizon.
+export const heightOf = ([x, y, z]) => Math.atan2(z, Math.hypot(x, y)) / RADIANS;
+
+// Its degrees from north over east, as on a compass.
+export const bearingOf = ([x, y]) => (Math.atan2(x, y) / RADIANS + 360) % 360;
+
+// The direction of a sun at these.
+export function sunFrom(height, bearing) {
+  const across = Math.cos(height * RADIANS);
+  const [sine, cosine] = [Math.sin(bearing * RADIANS), Math.cos(bearing * RADIANS)];
+  return [across * sine, across * cosine, Math.sin(height * RADIANS)];
+}
+
 // The direction of a sun that was moved, at the horizon at least.
 export function keptUp(sun) {
   const [x, y, z] = unit(sun);
