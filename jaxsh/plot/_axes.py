@@ -66,7 +66,7 @@ def _new_panels(shape: tuple[int, ...], size: tuple[float, float]) -> np.ndarray
     return grid.ravel()[:count]
 
 
-def color_bar(axes: Axes | Sequence[Axes], scale: ColorScale, label: str, **options) -> None:
+def color_bar(axes: Axes | Sequence[Axes], scale: ColorScale, label: str) -> None:
     """Draw a bar beside the axes, from which it takes the room."""
     one = axes if isinstance(axes, Axes) else axes[0]
     bar = one.figure.colorbar(
@@ -74,7 +74,8 @@ def color_bar(axes: Axes | Sequence[Axes], scale: ColorScale, label: str, **opti
         ax=axes if isinstance(axes, Axes) else list(axes),
         label=label,
         extend=scale.extend,
-        **{"fraction": 0.046, "pad": 0.03} | options,
+        fraction=0.046,
+        pad=0.03,
     )
     if isinstance(scale.norm, LogNorm):
         plain_logarithm(bar.ax.yaxis)

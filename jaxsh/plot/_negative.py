@@ -32,8 +32,7 @@ def mark_negative(
     if lowest.max() > 0:
         ax.contour(x, y, lowest, levels=[0.0], colors=MARK, linewidths=1.2)
     text = f"negative: {share}, down to −{-least:.2g}"
-    figure = ax.get_figure(root=True)
-    lower = ScaledTranslation(0, -below / 72, figure.dpi_scale_trans)
+    lower = ScaledTranslation(0, -below / 72, ax.figure.dpi_scale_trans)
     ax.legend(
         handles=[Patch(facecolor="none", edgecolor=MARK, hatch="///", label=text)],
         loc="upper center",

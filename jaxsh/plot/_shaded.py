@@ -89,5 +89,6 @@ def shaded(
         np.where(np.isfinite(lowest), lowest, largest),
         largest,
         f"{100 * share:.2g} % of the mesh",
+        below=32.0,  # below the bar of length
     )
     return ax
