@@ -36,11 +36,11 @@ $(VENV)/installed: pyproject.toml
 	$(bin)/python -m pip install --quiet --editable . --group check
 	touch $@
 
-# pytest in an environment, with those of the flags above that its JAX knows.
+# A module in an environment, pytest where none is named, with those of the flags above that its JAX knows.
 define quickly
 flags=""; for flag in $(QUICK_COMPILE); do \
 		XLA_FLAGS="$$flag" $(1)/bin/python -c "import jax; jax.devices()" 2> /dev/null && flags="$$flags $$flag"; \
-	done; XLA_FLAGS="$(XLA_FLAGS) $$flags" $(1)/bin/python -m pytest $(PARALLEL)
+	done; XLA_FLAGS="$(XLA_FLAGS) $$flags" $(1)/bin/python -m $(or $(2),pytest $(PARALLEL))
 endef
 
 # Peers hold JAX back, so they get an environment of their own.
@@ -96,8 +96,10 @@ check: $(VENV)/installed
 	$(bin)/ruff format --check .
 	$(bin)/basedpyright --pythonpath $(bin)/python
 
+# Open site/index.html. The notebooks are executed, unless .cache has it already.
+docs: export NO_MKDOCS_2_WARNING = 1
 docs: $(VENV)/installed
-	NO_MKDOCS_2_WARNING=1 $(bin)/mkdocs build --strict
+	$(call quickly,$(VENV),mkdocs build --strict)
 
 package: $(VENV)/installed
 	rm -rf dist
