@@ -19,11 +19,12 @@ bin := $(VENV)/bin
 # loadfile: what one file has traced serves its other tests.
 PARALLEL ?= -n auto --dist loadfile
 # Unoptimized machine code, by XLA's older way for loops on the CPU where this JAX still knows it: that
-# runs slower and compiles much faster, which is most of what tests do. Slow tests, test-all and
-# a plain pytest go without.
+# runs slower and compiles much faster, which is most of what tests do. Experiments, pages, examples of
+# docstrings, the oldest JAX, test-all and a plain pytest go without.
 QUICK_COMPILE ?= --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false
+LONG_RUNS := tests/experiments tests/test_documents.py
 
-.PHONY: reproduce report readme test test-slow test-all test-oldest test-newest test-minimal check docs package bench fuzz clean
+.PHONY: environments reproduce report readme test test-slow test-all test-oldest test-newest test-minimal check docs package bench fuzz clean
 
 # An environment, of another Python where one is named. Groups of dependencies need pip >= 25.1.
 define environment
@@ -62,6 +63,8 @@ $(NEWEST_VENV)/installed: pyproject.toml tools/newest_python.py
 	$(NEWEST_VENV)/bin/python -m pip install --quiet --editable . --group test
 	touch $@
 
+environments: $(VENV)/installed $(OLDEST_VENV)/installed $(NEWEST_VENV)/installed
+
 reproduce: $(VENV)/installed
 	$(bin)/python -m experiments run first_light environment --preset $(PRESET)
 
@@ -77,7 +80,8 @@ test: $(VENV)/installed
 
 test-slow: $(VENV)/installed
 	$(bin)/python -m pytest $(PARALLEL) jaxsh
-	$(bin)/python -m pytest $(PARALLEL) -m slow
+	$(call quickly,$(VENV)) -m slow tests $(LONG_RUNS:%=--ignore=%)
+	$(bin)/python -m pytest $(PARALLEL) -m slow $(LONG_RUNS)
 
 test-all: $(VENV)/installed
 	$(bin)/python -m pytest $(PARALLEL) -m ""
