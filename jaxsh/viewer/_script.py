@@ -7,19 +7,9 @@ from importlib.resources import files
 # Each after those that it imports from.
 _MODULES = (
     *("harmonics", "vectors", "scene", "gl", "controls", "sky", "near", "factors", "near_shading"),
-    *(
-        "handle",
-        "sun_handle",
-        "light_parts",
-        "glossy",
-        "glossy_part",
-        "parts",
-        "ball",
-        "pointer",
-        "view",
-        "save",
-    ),
-    *("ramp", "color_bar", "picking", "python_text", "overlay", "panel", "renderer", "false_color"),
+    *("python_text", "handle", "sun_handle", "light_parts", "glossy", "glossy_part", "parts"),
+    *("ball", "pointer", "view", "save"),
+    *("ramp", "color_bar", "picking", "overlay", "panel", "renderer", "false_color"),
     *("lobe", "viewer"),
 )
 _IMPORT = re.compile(r"^import\s[^;]*?from\s+\"(\./\w+)\.js\";\n", re.MULTILINE)

@@ -77,6 +77,9 @@ def test_the_sky_is_pythons_wherever_the_sun_is(page):
         page.evaluate("(facts) => viewer.set(facts)", facts)
         clear = sky.preetham_harmonics(np.array(sun), turbidity, DEGREE)  # the precise table
         whole = clear + sky.sun_harmonics(np.array(sun), turbidity, DEGREE)
+        said = {"imaging": imaging, "sky": sky, "jnp": jnp}
+        exec(page.evaluate("viewer.python()"), said)
+        np.testing.assert_allclose(said["light"], 0.05 * whole, rtol=0, atol=1e-4)
         assert apart(page, shaded(0.05 * whole * harmonics.window(window, DEGREE)[None])) < 0.1
 
 
@@ -128,6 +131,9 @@ def test_a_lamp_shades_as_midrange_does_and_is_dragged(page):
     assert np.linalg.norm(place - np.asarray(ball().center)) > 0.1
     moved = midrange.Sphere(jnp.asarray(place), ball().radius, ball().radiance)
     assert apart(page, lit_by(moved)) < 0.1
+    said = {"imaging": imaging, "midrange": midrange, "jnp": jnp}
+    exec(page.evaluate("viewer.python()"), said)
+    np.testing.assert_allclose(said["ball"].center, place, rtol=0, atol=1e-8)
     lamp.press("ArrowRight")
     assert page.evaluate("viewer.state.lamp") != place.tolist()
 

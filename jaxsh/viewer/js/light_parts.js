@@ -4,6 +4,7 @@ import { factorsOf, scaledBy } from "./factors.js";
 import { LampHandle } from "./handle.js";
 import { interpolated, keptNear, lampTerms } from "./near.js";
 import { NearShading } from "./near_shading.js";
+import { number, row } from "./python_text.js";
 import { bearingOf, heightOf, keptUp, skyLight, sunAt, sunFrom } from "./sky.js";
 import { SunHandle } from "./sun_handle.js";
 import { apply, minus, plus } from "./vectors.js";
@@ -30,6 +31,8 @@ export const windowPart = {
     const chosen = menu("Window against ringing", names, (i) => viewer.set({ window: kinds[i] }));
     return [{ ...chosen, show: (state) => chosen.set(kinds.indexOf(state.window)) }];
   },
+  python: ({ window, degree }) =>
+    window === "none" ? [] : [`# light = light * harmonics.window("${window}", ${degree})`],
 };
 
 // Coefficients of the sky in place of those that were sent, which are those of its first sun.
@@ -50,6 +53,22 @@ export const skyPart = {
   turn: (turn, state, scene) =>
     kindOf(scene, state) === "sky" ? { sun: keptUp(apply(turn, state.sun)) } : undefined,
   controls: (viewer) => (viewer.scene.sky ? skyControls(viewer) : []),
+  python: (state, scene) => {
+    if (kindOf(scene, state) !== "sky") return [];
+    const { sun, turbidity, disc, degree, intensity } = state;
+    if (sun[2] < 0) return ["# The sun is below the horizon: no light."];
+    const own = Math.min(degree, scene.sky.degree);
+    const lines = [
+      `sun, turbidity, gain = jnp.array([${row(sun)}]), ${number(turbidity)}, `
+        + number(intensity * scene.sky.gain),
+      `light = gain * sky.preetham_harmonics(sun, turbidity, ${own}, table="wide")`,
+    ];
+    if (degree > own) {
+      lines.push(`light = jnp.pad(light, ((0, 0), (0, ${(degree + 1) ** 2 - (own + 1) ** 2})))`);
+    }
+    if (disc) lines.push(`light += gain * sky.sun_harmonics(sun, turbidity, ${degree})`);
+    return lines;
+  },
 };
 
 // The lamp's light where the mesh is: in its middle for what shows one light, at each vertex for shading.
@@ -75,6 +94,18 @@ export const lampPart = {
     return { lamp: keptNear(scene.near, lamp) };
   },
   controls: (viewer) => (viewer.scene.near ? [new LampHandle(viewer)] : []),
+  python: (state, scene) => {
+    if (kindOf(scene, state) !== "lamp") return [];
+    const { radius, radiance } = scene.near;
+    if (scene.nearTerms) return [`# the lamp is at (${row(state.lamp)})`];
+    return [
+      "ball = midrange.Sphere(",
+      `    jnp.array([${row(state.lamp)}]),`,
+      `    jnp.array(${number(radius)}),`,
+      `    jnp.array([${row(radiance.map((x) => state.intensity * x))}]),`,
+      ")",
+    ];
+  },
 };
 
 // The light at the samples, which the picture and the mirror ball both ask for, is kept for a lamp.

@@ -9,6 +9,7 @@ import { lampPart, skyPart, windowPart } from "./light_parts.js";
 // - `light(coefficients, state, scene)`: other coefficients, three arrays, of those that shade;
 // - `shade(renderer, coefficients, state, side, scene)`: shades instead of `Renderer.shade`, and
 //   returns true where it did;
+// - `python(state, scene)`: lines of Python that say the same of the light;
 // - `seesCamera(scene)`: whether the camera changes its shading;
 // - `turn(rotation, state, scene)`: what of the state a rotation of the light changes instead of
 //   `rotation`, the rotation of its coefficients; nothing where it does not.

@@ -2,8 +2,8 @@
 import { tangentOf } from "./vectors.js";
 
 // As a float of Python has it.
-const number = (x) => String(Number(x.toPrecision(9))).replace(/^-?\d+$/, "$&.0");
-const row = (values) => values.map(number).join(", ");
+export const number = (x) => String(Number(x.toPrecision(9))).replace(/^-?\d+$/, "$&.0");
+export const row = (values) => values.map(number).join(", ");
 
 // A camera whose picture is that of a window of `width` by `height` pixels, the exposure, and how the
 // light was turned.

@@ -175,7 +175,12 @@ export class Viewer {
   python() {
     const { width, height } = this.canvas;
     const [, , ...size] = this.#rectangles(width, height)[0];
-    return pythonText(this.state, this.state.exposure * this.scene.exposure, ...size);
+    const { scene, state } = this;
+    // Sky and lamp are turned otherwise.
+    const rotation = scene.kinds[state.index] === "given" ? state.rotation : UNTURNED;
+    const own = PARTS.flatMap((part) => part.python?.(state, scene) ?? []);
+    const text = pythonText({ ...state, rotation }, state.exposure * scene.exposure, ...size);
+    return text + own.map((line) => `${line}\n`).join("");
   }
 
   async copy() {
