@@ -14,6 +14,7 @@ from experiments.runner.places import Place
 from experiments.runner.registry import entries
 from experiments.runner.report import to_markdown
 from experiments.runner.results import Shown, _tables, in_view
+from experiments.runner.sources import digests
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium")
 PAPER = """\
@@ -131,6 +132,26 @@ def test_stale_is_what_the_code_would_no_longer_give(toy_paper, before, after, w
     page = report(toy_paper)[3]
     assert (f"stale: {why}" if why else "stale: ") in page or not why
     assert bool(why) == ("stale: " in page)
+
+
+def test_the_code_of_an_experiment_is_what_it_uses():
+    [path] = [entry.path for entry in entries().values() if entry.name == "annen2004.figure8"]
+    files = set(digests(path.with_suffix(".py")))
+    assert files >= {
+        "experiments/annen2004/figure8.py",
+        "experiments/annen2004/plots.py",
+        "experiments/runner/data.py",
+        "jaxsh/harmonics/_basis.py",
+        "jaxsh/midrange/_taylor.py",
+        "jaxsh/geometry/_files/_ply.py",  # a mesh may come from one
+    }
+    others = (
+        "jaxsh/viewer/",
+        "jaxsh/inverse/",
+        "jaxsh/imaging/_splats.py",
+        "experiments/runner/cli",
+    )
+    assert not [name for name in files if name.startswith(others)]
 
 
 def test_stale_is_what_a_changed_preset_would_not_give(toy_paper):
