@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from jaxsh import geometry, imaging
 
-from ..shared.plots import View
+from ..shared.plots import GROUND, View
 
 _RADIUS = 0.045
 _YELLOW = (1.0, 0.75, 0.05)
@@ -21,10 +21,7 @@ def glass(
     vertices = np.concatenate([ball.vertices + point for point in points])
     faces = np.concatenate([ball.faces + i * len(ball.vertices) for i in range(len(points))])
     dots = geometry.make_mesh(vertices, faces)
-    toward = camera.position - camera.target
-    toward = (toward / jnp.linalg.norm(toward)).astype(view.mesh.normals.dtype)
-    facing = jnp.clip(view.mesh.normals @ toward, 0, 1)[:, None]
-    gray = imaging.interpolate(view.raster, 0.02 + 0.25 * facing**2)
+    gray = imaging.interpolate(view.raster, 0.02 + 0.25 * view.facing[:, None] ** 2, GROUND)
     raster = imaging.rasterize(dots, camera, samples=samples)
     color = jnp.broadcast_to(jnp.asarray(_YELLOW, gray.dtype), (len(dots.vertices), 3))
     image = imaging.interpolate(raster, color, jnp.repeat(gray, 3, axis=-1))

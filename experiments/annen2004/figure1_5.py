@@ -42,7 +42,7 @@ class Figure15:
     samples: int = 2
     """rays along each side of a pixel"""
     gain: float = 8.0
-    """of the difference pictures"""
+    """of the errors: their colors are full at ± 1/gain of white"""
 
     def __post_init__(self):
         if self.distance - self.side <= 1:
@@ -93,7 +93,7 @@ def figure1_5(config: Figure15, context: Context) -> list[Table]:
                 )
         caption = (
             f"{name}: above, what each makes of the light, and the exact light of each vertex; "
-            f"below, how far each is from it, × {config.gain:g}"
+            "below, how far each is from it: red where it is brighter, blue where darker"
         )
         _draw(config, context.path(f"{name}.png", caption), view, shaded, reference)
     return list(_tables(config, context.rows))
@@ -155,9 +155,11 @@ def _draw(config: Figure15, path, view: View, shaded, reference: Float[Array, "v
     by_method = next(iter(shaded.values()))
     above = [Panel(view.shown(by_method[name]), name) for name in _SHOWN]
     below = [
-        Panel(
-            view.difference(by_method[name], reference, config.gain),
-            f"{view.psnr(by_method[name], reference)[0]:.1f} dB, difference × {config.gain:g}",
+        view.error(
+            f"its error, {view.psnr(by_method[name], reference)[0]:.1f} dB",
+            by_method[name],
+            reference,
+            config.gain,
         )
         for name in _SHOWN
     ]

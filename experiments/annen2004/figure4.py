@@ -43,12 +43,12 @@ class Figure4:
     directions: int = 1024
     """directions of the bake"""
     albedo: float = 0.8
-    size: int = 360
+    size: int = 400
     """height of a panel, in pixels"""
     samples: int = 2
     """rays along each side of a pixel"""
     gain: float = 4.0
-    """of the difference pictures"""
+    """of the errors: their colors are full at ± 1/gain of white"""
 
     def __post_init__(self):
         if self.positions < 3 or self.positions % 2 == 0:
@@ -87,15 +87,14 @@ def figure4(config: Figure4, context: Context) -> Table:
     exposure = View.of(middle.mesh, camera, middle.reference).exposure
     panels: dict[str, list[Panel]] = {}
     for place in context.progress(places, "positions"):
-        raster = imaging.rasterize(place.mesh, camera, samples=config.samples)
-        view = View(place.mesh, raster, exposure)
+        view = View.by(place.mesh, camera, samples=config.samples)._replace(exposure=exposure)
         row = _row(config, view, place)
         context.record(row)
         for name, panel in _panels(config, view, place, row, behind).items():
             panels.setdefault(name, []).append(panel)
     caption = (
         f"{subject.name} under a light that is sampled once, for the head in the middle; the last "
-        f"row is how far the gradient is from the reference, × {config.gain:g}"
+        "row is how far the gradient is from the reference: red where brighter, blue where darker"
     )
     draw_panels(context.path("figure4.png", caption), list(panels.values()))
     return _table(config, subject)
@@ -162,10 +161,11 @@ def _panels(
         name: Panel(view.shown(place.shaded[name], behind), f"{name}: {row[name]:.1f} dB")
         for name in _ORDERS[:2]
     }
-    apart = view.difference(place.shaded["with gradient"], place.reference, config.gain)
+    title = "gradient, its error"
+    apart = view.error(title, place.shaded["with gradient"], place.reference, config.gain)
     return shown | {
         "reference": Panel(view.shown(place.reference, behind), "reference"),
-        "difference": Panel(apart, f"|gradient − reference| × {config.gain:g}"),
+        "difference": apart,
     }
 
 

@@ -42,7 +42,7 @@ class Figure6:
     degree: int = 4
     resolution: int = 64
     """texels along a side of a radiance cube's face"""
-    size: int = 72
+    size: int = 136
     """height and width of a cube's face in the picture, in pixels"""
 
     def __post_init__(self):

@@ -20,7 +20,7 @@ from .overlap import overlapping, overlapping_light
 
 _SAMPLES = 8
 _WIDTH = 0.9  # of a panel, in its heights
-_GAIN = 4.0  # of the difference pictures
+_GAIN = 4.0  # of the errors' colors: full at ± 1/4 of white
 _TOWARD = (-0.35, -1.0, 0.3)  # from the mesh to the camera
 
 
@@ -34,7 +34,7 @@ class Figure7:
     """texels along a side of a radiance cube's face; pictures are of the first"""
     directions: int = 1024
     """directions of the bake"""
-    size: int = 360
+    size: int = 400
     """height of a panel, in pixels"""
     samples: int = 2
     """rays along each side of a pixel"""
@@ -87,8 +87,10 @@ def figure7(config: Figure7, context: Context) -> list[Table]:
                 }
             )
     caption = (
-        f"{subject.name}: letters as in the paper; the others it lacks. Each difference is that of "
-        "the picture before it from the reference; dots are the samples of (e) and (f), as in glass"
+        f"{subject.name}: letters as in the paper; the others it lacks. Below each its error: red "
+        "where it is brighter than the reference, blue where darker; dots are the samples of (e) "
+        "and (f), as in glass. The paper's red and blue lights are orange and azure here: together "
+        "they are near white, and what one of them alone reaches has its color"
     )
     _draw(config, context.path("figure7.png", caption), trial, renderings[0], eight)
     return [_table(config, context.rows, subject), _verdicts(config, context.rows)]
@@ -136,19 +138,17 @@ def _draw(
     mesh, width = trial.subject.mesh, round(_WIDTH * config.size)
     camera = imaging.Camera.facing(mesh, width=width, height=config.size, toward=_TOWARD)
     view = View.of(mesh, camera, trial.reference, samples=config.samples)
+
+    def error(shown: Shown) -> Panel:
+        return view.error("its error", shown.radiance, trial.reference, _GAIN)
+
     panels = [Panel(view.shown(x.radiance), _title(x, trial)) for x in renderings]
-    apart = [
-        Panel(
-            view.difference(renderings[i].radiance, trial.reference, _GAIN),
-            f"difference × {_GAIN:g}",
-        )
-        for i in (1, 3, 5, 8)
-    ]
-    a, b, e, f, one_edges, eight_edges, *grids = panels
     c = Panel(view.shown(trial.reference), "(c) reference")
     d = Panel(glass(view, camera, eight, samples=config.samples), "(d) eight samples")
-    rows = [[a, b, apart[0], c, d], [e, f, apart[1], eight_edges, apart[2]]]
-    draw_panels(path, [*rows, [one_edges, *grids, apart[3]]])
+    order = (0, 1, 4, 2, 3), (5, 6, 7, 8)  # with the paper's letters first
+    above, below = ([panels[i] for i in line] for line in order)
+    first, last = ([error(renderings[i]) for i in line] for line in order)
+    draw_panels(path, [above, first, [*below, c], [*last, d]])
 
 
 def _title(shown: Shown, trial: Trial) -> str:

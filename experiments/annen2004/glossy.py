@@ -41,12 +41,12 @@ class Glossy:
     """specular albedo in the pictures"""
     directions: int = 1024
     """directions of the bake"""
-    size: int = 360
+    size: int = 400
     """height of a panel, in pixels"""
     samples: int = 2
     """rays along each side of a pixel"""
     gain: float = 8.0
-    """of the difference pictures"""
+    """of the errors: their colors are full at ± 1/gain of white"""
 
     def __post_init__(self):
         if self.distance - self.side <= 1 or self.side <= 0:
@@ -90,7 +90,7 @@ def glossy(config: Glossy, context: Context) -> list[Table]:
         if surface.name == _shown(config):
             caption = (
                 f"{subject.name}, {surface.name}: above, light from few samples, and of each "
-                f"vertex; below, how far each is from it, × {config.gain:g}"
+                "vertex; below, how far each is from it: red where brighter, blue where darker"
             )
             _draw(config, context.path("glossy.png", caption), view, shaded, reference)
     return [_table(config, context.rows, subject)]
@@ -128,9 +128,11 @@ def _shown(config: Glossy) -> str:
 def _draw(config: Glossy, path: Path, view: View, shaded: dict[str, Array], reference) -> None:
     above = [Panel(view.shown(radiance), name) for name, radiance in shaded.items()]
     below = [
-        Panel(
-            view.difference(radiance, reference, config.gain),
-            f"{view.psnr(radiance, reference)[0]:.1f} dB, × {config.gain:g}",
+        view.error(
+            f"its error, {view.psnr(radiance, reference)[0]:.1f} dB",
+            radiance,
+            reference,
+            config.gain,
         )
         for radiance in shaded.values()
     ]

@@ -10,8 +10,9 @@ from jaxsh import midrange
 
 from ..shared.lights import exact_light, rectangle
 
-# The figure's blue light has no red in it: in the red channel it is a blocker and nothing else.
-_RED, _BLUE = (1.0, 0.12, 0.08), (0.0, 0.16, 1.0)
+# The blue light has no red in it: in the red channel it is a blocker and nothing else. Their green
+# makes both together near white, where red and blue alone would be purple everywhere.
+_RED, _BLUE = (1.0, 0.4, 0.08), (0.0, 0.5, 1.0)
 _FAR = np.array([-1.6, -2.7, 2.5])  # the red light's centre
 _TOP = np.array([0.0, 0.0, 0.9])  # from up here the blue light's centre hides the red one's
 _BETWEEN = 0.55

@@ -47,7 +47,7 @@ class Placement:
     """of light and transfer"""
     directions: int = 1024
     """directions of the bake"""
-    size: int = 240
+    size: int = 400
     """height of a panel, in pixels"""
 
     def __post_init__(self):

@@ -30,6 +30,7 @@ _DOUBTS = 12.0, 5.0, 2.0, 0.7
 _NODES = 2**14
 # Where rays start above the surface, in the mesh's longest extent.
 _OFFSET = 1e-3
+_SHOWN = 400  # pixels of the picture's height
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,6 +64,7 @@ class View(NamedTuple):
     """What one picture shows of a mesh, pixel by pixel, and what each pixel sees."""
 
     raster: imaging.Raster
+    smooth: imaging.Raster  # the same in many pixels, to be looked at
     scene: geometry.RayScene
     baked: transfer.Transfer  # of the P pixels on the mesh
     normals: Float[np.ndarray, "p 3"]
@@ -136,10 +138,11 @@ def run(config: InverseDaylight, context: Context) -> Table:
                     )
                     shown.append(Shown(truth, observed, again, found.value, seen))
     caption = (
-        "observed, and as rendered from the light that was found; the true light and the one "
-        "found, with circles where the suns are"
+        "observed, and as rendered from the light that was found, smooth between the pixels; the "
+        "true light and the one found, with circles where the suns are"
     )
-    draw(context.path("recovered.png", caption), view.raster, shown)
+    mask = np.asarray(view.raster.mask)
+    draw(context.path("recovered.png", caption), view.smooth, mask, shown)
     about = {"name": name, "pixels": len(view.free)}
     return Table("Daylight from one picture", rows=_rows(config, context), values=about)
 
@@ -150,6 +153,8 @@ def _view(config: InverseDaylight, context: Context) -> tuple[View, str]:
     camera = imaging.Camera.facing(mesh, width=config.height, height=config.height)
     scene = geometry.ray_scene(mesh)
     raster = imaging.rasterize(mesh, camera, scene=scene)
+    large = dataclasses.replace(camera, width=_SHOWN, height=_SHOWN)
+    smooth = imaging.rasterize(mesh, large, scene=scene, samples=2)
     on = np.asarray(raster.mask)
 
     def of_pixels(values):
@@ -172,7 +177,7 @@ def _view(config: InverseDaylight, context: Context) -> tuple[View, str]:
     for at, direction in enumerate(context.progress(directions, "rays")):
         out = normals @ direction > 0
         free[out, at] = ~scene.occluded(origins[out], direction)
-    return View(raster, scene, pixels, normals, origins, directions, free), name
+    return View(raster, smooth, scene, pixels, normals, origins, directions, free), name
 
 
 def _truths(kind: Sky, count: int, seed: int) -> list[Truth]:

@@ -5,16 +5,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Bool, Float
+from scipy.ndimage import distance_transform_edt, zoom
 
-from jaxsh import imaging, inverse, sphere
+from jaxsh import imaging, inverse, plot, sphere
 
 from ..shared.plots import plt, save
 
 if TYPE_CHECKING:
     from .daylight import Truth
 
-_ROWS = 90
+_ROWS = 180
 
 
 class Shown(NamedTuple):
@@ -27,50 +28,64 @@ class Shown(NamedTuple):
     model: "Truth"  # whose sky is that of the value
 
 
-def draw(path: Path, raster: imaging.Raster, shown: list[Shown]) -> None:
-    """A row for each sky: the mesh observed and rendered again; the light, true and found."""
+def draw(path: Path, smooth: imaging.Raster, mask: Bool[np.ndarray, "h w"], shown: list[Shown]):
+    """A row for each sky: the mesh observed and rendered again; the light, true and found.
+
+    Between the few pixels that were observed, those of `mask`, colors are interpolated; `smooth` is
+    the mesh in as many pixels as the picture shows.
+    """
     figure, axes = plt.subplots(
         len(shown),
         4,
-        figsize=(12, 2.6 * len(shown)),
-        width_ratios=[1, 1, 2, 2],
+        figsize=(18, 4.2 * len(shown)),
+        width_ratios=[1, 1, 1.7, 1.7],
         layout="constrained",
         squeeze=False,
     )
-    mask = np.asarray(raster.mask)
     directions = np.asarray(sphere.lat_long(_ROWS, 2 * _ROWS).directions, np.float64)
     for row, case in zip(axes, shown, strict=True):
         truth, value = case.truth, case.value
-        pictures = []
-        for color in (case.observed, case.again):
-            picture = np.zeros((*mask.shape, 3))
-            picture[mask] = color
-            pictures.append(picture)
-        exposure = imaging.auto_exposure(jnp.asarray(pictures[0]), raster.mask)
-        for axis, picture in zip(row, pictures, strict=False):
-            shades = np.array(imaging.tone_map(jnp.asarray(picture), exposure))
-            shades[~mask] = 1
-            axis.imshow(shades)
+        exposure = imaging.auto_exposure(jnp.asarray(case.observed)[None])
+        for axis, color in zip(row, (case.observed, case.again), strict=False):
+            axis.imshow(_filled(color, mask, smooth, exposure))
+            axis.axis("off")
         lights = truth.radiance(directions), _radiance(case, directions)
         exposure = 0.5 / lights[0].mean()
         suns = (truth.sun if truth.facing.any() else None), np.asarray(value.sun)
         for axis, light, sun in zip(row[2:], lights, suns, strict=True):
-            image = jnp.asarray(light.reshape(_ROWS, 2 * _ROWS, 3))
-            axis.imshow(imaging.tone_map(image, exposure, curve="reinhard", white=4.0))
+            plot.light(light.reshape(_ROWS, 2 * _ROWS, 3), exposure=float(exposure), ax=axis)
             if sun is not None:
-                angle = np.arctan2(sun[1], sun[0]) % (2 * np.pi)
-                place = angle / np.pi * _ROWS - 0.5, np.arccos(sun[2]) / np.pi * _ROWS - 0.5
-                axis.plot(*place, "o", color="k", markerfacecolor="none", markersize=9)
+                angle = np.degrees(np.arctan2(sun[1], sun[0])) % 360
+                place = angle, np.degrees(np.arccos(sun[2]))
+                axis.plot(*place, "o", mec="black", mfc="none", mew=1.5, ms=11, label="sun")
+                axis.legend(loc="lower right", fontsize="small")
+        pixels = f"{mask.shape[0]} × {mask.shape[1]} pixels"
         titles = (
-            f"observed, {truth.kind}",
+            f"observed, {truth.kind}, {pixels}",
             "rendered again",
             f"true, turbidity {truth.turbidity:.2f}" if truth.facing.any() else "true, no sun",
             f"found, turbidity {float(value.turbidity):.2f}",
         )
         for axis, title in zip(row, titles, strict=True):
-            axis.set_title(title, fontsize=10)
-            axis.axis("off")
-    save(figure, path, dpi=100)
+            axis.set_title(title)
+    save(figure, path)
+
+
+def _filled(
+    color: Float[np.ndarray, "p 3"],
+    mask: Bool[np.ndarray, "h w"],
+    smooth: imaging.Raster,
+    exposure: Float[Array, ""],
+) -> Float[np.ndarray, "H W 4"]:
+    """The pixels of the mask in a larger picture, without steps within the mesh or at its edge."""
+    picture = np.zeros((*mask.shape, 3))
+    picture[mask] = color
+    nearest = distance_transform_edt(~mask, return_distances=False, return_indices=True)
+    picture = picture[tuple(nearest)]  # none of what is behind the mesh comes in
+    alpha = np.asarray(smooth.alpha)
+    scale = [wide / narrow for wide, narrow in zip(alpha.shape, mask.shape, strict=True)]
+    wide = zoom(picture, (*scale, 1), order=1, mode="nearest", grid_mode=True)
+    return np.dstack([np.asarray(imaging.tone_map(jnp.asarray(wide), exposure)), alpha])
 
 
 def _radiance(case: Shown, directions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:

@@ -43,7 +43,7 @@ class Emitters:
     starts: int = 2
     max_steps: int = 100
     albedo: float = 0.7
-    height: int = 256
+    height: int = 480
     """of the pictures, in pixels"""
 
     def __post_init__(self):
@@ -88,8 +88,8 @@ def emitters(config: Emitters, context: Context) -> Table:
     assert shown is not None
     caption = (
         f"{name} under the last number of lights, with noise: as observed, drawn again with the "
-        "lights recovered, the difference; and from aside, the true outlines (white) under the "
-        "recovered (orange), and where the best start was (grey)"
+        "lights recovered, what is wrong with that; and from aside, the outlines of the true "
+        "lights, of those recovered, and of the best start"
     )
     draw(context.path("recovered.png", caption), mesh, baked, shown, config, context.key)
     return _table(config, context, name, len(mesh.vertices), len(seen.positions))

@@ -4,10 +4,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
 
-from jaxsh import geometry, imaging, inverse, midrange, transfer
+from jaxsh import geometry, imaging, inverse, midrange, plot, transfer
 
 from ..shared.plots import View, plt, save
 from .lights import shade, with_noise
@@ -15,9 +18,8 @@ from .lights import shade, with_noise
 if TYPE_CHECKING:
     from .emitters import Emitters
 
-_GAIN = 20.0
-_ASIDE = (0.9, -1.6, 0.9)  # from where lights and mesh are seen together
-_GREY = 0.2
+_UNIT = "radii"  # of the mesh's bounding sphere: what its lengths are in
+_TRUE, _FOUND, _START = "black", "tab:orange", "0.55"
 
 
 class Scene(NamedTuple):
@@ -37,56 +39,77 @@ def draw(
     config: "Emitters",
     key: Array,
 ) -> None:
-    """Observed, drawn again, the difference; and the lights' outlines from aside."""
+    """Observed, drawn again, how far that is from the truth; and the lights from aside."""
     clean, again = (
         shade([light.polygon for light in lights], baked, config.albedo)
         for lights in (scene.truth, scene.found)
     )
     observed = with_noise(clean, scene.noise, jax.random.fold_in(key, 1))
     size = config.height
-    view = View.of(mesh, imaging.Camera.facing(mesh, width=size, height=size), clean, samples=2)
-    panels = {
-        f"observed, noise {100 * scene.noise:g} %": view.shown(observed),
-        "with the lights recovered": view.shown(again),
-        f"difference from the light without noise, × {_GAIN:g}": view.difference(
-            again, clean, _GAIN
-        ),
-    }
-    figure, axes = plt.subplots(1, 4, figsize=(14, 3.9), layout="constrained")
-    for axis, (title, image) in zip(axes, panels.items(), strict=False):
-        axis.imshow(image)
-        axis.set_title(title, fontsize=10)
-    _draw_aside(axes[3], mesh, again, scene, config.height)
-    axes[3].set_title("from aside: true (white), recovered, start (grey)", fontsize=10)
-    for axis in axes:
-        axis.axis("off")
+    ahead, aside = _directions(scene.truth[0])
+    camera = imaging.Camera.facing(mesh, toward=ahead, width=size, height=size)
+    exposure = View.of(mesh, camera, clean).exposure
+    figure, axes = plt.subplots(2, 2, figsize=(11, 10.6), layout="constrained")
+    titles = f"observed, noise {100 * scene.noise:g} %", "by the lights recovered"
+    for axis, title, color in zip(axes[0], titles, (observed, again), strict=True):
+        plot.shaded(
+            mesh, jnp.maximum(color, 0), camera=camera, exposure=exposure, length=_UNIT, ax=axis
+        )
+        axis.set_title(title)
+    apart = 100 * exposure * jnp.mean(again - clean, axis=1)
+    label = "error, mean of R, G, B, % of white"
+    plot.vertices(mesh, apart, label=label, camera=camera, length=_UNIT, ax=axes[1, 0])
+    axes[1, 0].set_title("recovered less true")
+    _draw_aside(axes[1, 1], mesh, again, scene, (aside, size, exposure))
+    axes[1, 1].set_title("the lights, seen from aside")
     save(figure, path, dpi=100)
 
 
-def _draw_aside(axis, mesh, again: Float[Array, "v 3"], scene: Scene, size: int) -> None:
-    direction = np.array(_ASIDE) / np.linalg.norm(_ASIDE)
-    camera = imaging.Camera(
-        position=8.5 * direction, target=np.zeros(3), fov_y=32.0, width=size, height=size
+def _directions(light: inverse.Rectangle) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """From the mesh to cameras: one beside the first light, and one that sees it from its edge."""
+    towards = np.asarray(light.center) / np.linalg.norm(light.center)
+    across = np.cross(towards, [0.0, 0.0, 1.0])
+    across /= np.linalg.norm(across)
+    up = np.array([0.0, 0.0, 0.3])
+    ahead, aside = 0.8 * towards + across + up, across + up
+    return tuple(ahead.tolist()), tuple(aside.tolist())
+
+
+def _draw_aside(
+    axis: Axes,
+    mesh: geometry.Mesh,
+    color: Float[Array, "v 3"],
+    scene: Scene,
+    view: tuple[tuple[float, ...], int, float],
+) -> None:
+    toward, size, exposure = view
+    outlines = {
+        "start": ([light.vertices for light in scene.starts[0]], _START, "-", 2.0),
+        "true, and its normal": ([light.vertices for light in scene.truth], _TRUE, "-", 4.0),
+        "recovered": ([light.vertices for light in scene.found], _FOUND, "--", 2.0),
+    }
+    corners = [np.asarray(each) for light, *_ in outlines.values() for each in light]
+    points = np.concatenate([np.asarray(mesh.vertices), *corners])
+    everything = geometry.Mesh(points, mesh.faces, np.zeros_like(points))
+    camera = imaging.Camera.facing(everything, toward=toward, width=size, height=size, margin=0.1)
+    plot.shaded(
+        mesh, jnp.maximum(color, 0), camera=camera, exposure=exposure, length=_UNIT, ax=axis
     )
-    axis.imshow(View.of(mesh, camera, again, samples=2).shown(again))
-    for light in scene.starts[0]:
-        _outline(axis, camera, np.asarray(light.vertices), color="grey", linewidth=1)
+    for label, (lights, edge, style, width) in outlines.items():
+        for number, light in enumerate(lights):
+            place = _pixels(camera, np.asarray(light))
+            said = label if number == 0 else None
+            axis.add_patch(
+                Polygon(place, fill=False, edgecolor=edge, ls=style, lw=width, label=said)
+            )
     for light in scene.truth:
-        corners = np.asarray(light.vertices)
-        _outline(axis, camera, corners, color="white", linewidth=4)
         # Which side shines: a line from the middle along the normal.
         middle, normal = np.asarray(light.center), np.cross(*np.asarray(light.axes))
         line = _pixels(camera, np.stack([middle, middle + 0.35 * normal]))
-        axis.plot(*line.T, color="white", linewidth=1)
-    for light in scene.found:
-        _outline(axis, camera, np.asarray(light.vertices), color="tab:orange", linewidth=1.5)
-    axis.set_xlim(0, size)
-    axis.set_ylim(size, 0)
-
-
-def _outline(axis, camera: imaging.Camera, corners: Float[np.ndarray, "n 3"], **style) -> None:
-    line = _pixels(camera, np.concatenate([corners, corners[:1]]))
-    axis.plot(*line.T, **style)
+        axis.plot(*line.T, color=_TRUE, linewidth=1.5)
+    axis.legend(
+        loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=3, fontsize="small", frameon=False
+    )
 
 
 def _pixels(camera: imaging.Camera, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:

@@ -50,7 +50,7 @@ class InverseLight:
     """directions of the bake"""
     transfer_degree: int = 6
     """of the transfer with shadows"""
-    height: int = 160
+    height: int = 400
     """of a panel, in pixels"""
 
     def __post_init__(self):

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jaxsh import geometry, harmonics, imaging, sphere
+from jaxsh import geometry, harmonics, imaging, plot, sphere
 
 from ..shared.plots import View, plt, save
 
@@ -30,51 +30,31 @@ def draw(
     toward: Float[np.ndarray, " 3"],
     height: int,
 ) -> None:
-    """Rows: probes. Columns: the mesh's front and back as lit, its back as found, the lights."""
+    """For each probe: the mesh's front and back as lit, and its back as found; the lights."""
     away = toward * np.array([-1.0, -1.0, 1.0])
-    cameras = [
+    front, back = (
         imaging.Camera.facing(mesh, toward=(x, y, z), width=height, height=height)
         for x, y, z in (toward.tolist(), away.tolist())
-    ]
-    figure, axes = plt.subplots(
-        len(pictures),
-        7,
-        figsize=(15, 1.75 * len(pictures) + 0.2),
-        width_ratios=[1, 1, 1, 1, 1.7, 1.7, 1.7],
-        layout="constrained",
-        squeeze=False,
     )
-    for row, picture in zip(axes, pictures, strict=True):
+    figure = plt.figure(figsize=(14, 7.2 * len(pictures)), layout="constrained")
+    blocks = figure.subfigures(len(pictures), 1, squeeze=False)[:, 0]
+    for block, picture in zip(blocks, pictures, strict=True):
+        block.suptitle(picture.name, fontsize="x-large")
+        above, below = block.subfigures(2, 1, height_ratios=[1.05, 1])
         exact = jnp.asarray(picture.irradiance)
-        front = View.of(mesh, cameras[0], exact, samples=2)
-        back = View(mesh, imaging.rasterize(mesh, cameras[1], samples=2), front.exposure)
-        shown = [front.shown(exact), back.shown(exact)]
-        titles = ["what is seen", "its back"]
+        shown = [("what is seen", exact, front), ("its back", exact, back)]
+        for method, light in picture.fits.items():
+            found = sphere.irradiance(jnp.asarray(light), mesh.normals)
+            shown.append((f"back, {_METHODS[method]}", found, back))
+        exposure = View.of(mesh, front, exact).exposure
+        for axis, (title, values, camera) in zip(above.subplots(1, 4), shown, strict=True):
+            plot.shaded(mesh, values, camera=camera, exposure=exposure, ax=axis)
+            axis.set_title(title)
         count = next(iter(picture.fits.values())).shape[-1]
         lights = [picture.truth[:, :count], *picture.fits.values()]
-        for method, light in picture.fits.items():
-            shown.append(back.shown(sphere.irradiance(jnp.asarray(light), mesh.normals)))
-            titles.append(f"back, {_METHODS[method]}")
         glow = 0.5 / (float(picture.truth[:, 0].mean()) / np.sqrt(4 * np.pi))
-        for light, title in zip(lights, ["true", *_METHODS.values()], strict=True):
-            seen = sphere.reconstruct_lat_long(jnp.asarray(light), 64, 128)
-            image = np.array(imaging.tone_map(seen, glow))
-            image[np.asarray(seen.mean(axis=-1)) < 0] = (0.25, 0.35, 1.0)  # negative
-            shown.append(image)
-            titles.append(f"light of degree {harmonics.degree_of(count)}, {title}")
-        for axis, image, title in zip(row, shown, titles, strict=True):
-            axis.imshow(image)
-            axis.set_axis_off()
-            if picture is pictures[0]:
-                axis.set_title(title, fontsize=9)
-        row[0].text(
-            -0.04,
-            0.5,
-            picture.name,
-            rotation=90,
-            va="center",
-            ha="right",
-            transform=row[0].transAxes,
-            fontsize=9,
-        )
-    save(figure, path, dpi=100)
+        titles = ["true", *_METHODS.values()]
+        for axis, title, light in zip(below.subplots(1, 3), titles, lights, strict=True):
+            plot.light(light, exposure=glow, ax=axis)
+            axis.set_title(f"light of degree {harmonics.degree_of(count)}, {title}", pad=24)
+    save(figure, path)

@@ -6,12 +6,13 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from matplotlib.patches import Circle
 
 from jaxsh import geometry, imaging, inverse, sky
 
-from ..shared.plots import plt, save
+from ..shared.plots import View, plt, save
 
-_DOME = 160
+_DOME = 480  # pixels across
 
 
 class Case(NamedTuple):
@@ -57,41 +58,43 @@ def draw_sky(
 ) -> None:
     """Columns: noise. Rows: the mesh as observed, the dome of the sky recovered from it."""
     camera = imaging.Camera.facing(mesh, width=height, height=height)
-    raster = imaging.rasterize(mesh, camera, samples=2)
-    first = imaging.interpolate(raster, cases[0].observed)
-    exposure = float(imaging.auto_exposure(first, raster.mask))
+    view = View.of(mesh, camera, cases[0].observed, samples=2)
     figure, axes = plt.subplots(
-        2,
-        len(cases),
-        figsize=(2.5 * len(cases), 5.6),
-        layout="constrained",
-        squeeze=False,
+        2, len(cases), figsize=(4.2 * len(cases), 9), layout="constrained", squeeze=False
     )
     for (above, below), case in zip(axes.T, cases, strict=True):
-        image = imaging.interpolate(raster, case.observed, 1 / exposure)
-        above.imshow(imaging.tone_map(image, exposure))
-        above.set_title(f"noise {100 * case.noise:g} %", fontsize=10)
-        _draw_dome(below, case.found.value, sun)
+        above.imshow(view.shown(case.observed, 1.0))
+        above.set_title(f"observed, noise {100 * case.noise:g} %")
         above.axis("off")
-        below.axis("off")
-    save(figure, path, dpi=100)
+        _draw_dome(below, case.found.value, sun)
+    save(figure, path)
 
 
 def _draw_dome(axis, value: inverse.SkyLight, sun: Float[np.ndarray, " 3"]) -> None:
     """The hemisphere from below, zenith in the middle, equal areas; rings around both suns."""
     x, y = np.meshgrid(*[np.linspace(-1, 1, _DOME)] * 2)
     squared = x * x + y * y
-    inside = squared <= 1
-    # Lambert's projection: |p|² = 1 - z.
-    z = np.where(inside, 1 - squared, 0.0)
-    stretch = np.sqrt(np.maximum(1 + z, 1e-9))
-    views = jnp.asarray(np.stack([x * stretch, y * stretch, z], axis=-1))
+    # Lambert's projection: |p|² = 1 - z. What lies beyond the horizon is cut off below.
+    z = np.maximum(1 - squared, 0.0)
+    stretch = np.sqrt(1 + z)
+    views = np.stack([x * stretch, y * stretch, z], axis=-1)
+    views = jnp.asarray(views / np.linalg.norm(views, axis=-1, keepdims=True))
     seen = sky.preetham_radiance(views, value.sun, value.turbidity, check="allow")
-    level = float(jnp.mean(seen[jnp.asarray(inside)]))
-    shown = np.array(imaging.tone_map(seen, 0.6 / level, curve="reinhard", white=4.0))
-    shown[~inside] = 1
-    axis.imshow(shown, extent=(-1, 1, -1, 1), origin="lower")
-    for direction, color, size in ((sun, "k", 13), (np.asarray(value.sun), "w", 8)):
+    level = float(jnp.mean(seen[jnp.asarray(squared <= 1)]))
+    shown = imaging.tone_map(seen, 0.6 / level, curve="reinhard", white=4.0)
+    image = axis.imshow(shown, extent=(-1, 1, -1, 1), origin="lower", interpolation="bilinear")
+    horizon = Circle((0, 0), 1, facecolor="none", edgecolor="0.4", transform=axis.transData)
+    axis.add_patch(horizon)
+    image.set_clip_path(horizon)
+    suns = (sun, "black", 13, "true sun"), (np.asarray(value.sun), "white", 8, "recovered")
+    for direction, color, size, label in suns:
         place = direction[:2] / np.sqrt(1 + direction[2])
-        axis.plot(*place, "o", markerfacecolor="none", markeredgecolor=color, markersize=size)
-    axis.set_title(f"turbidity {float(value.turbidity):.3f}", fontsize=10)
+        axis.plot(*place, "o", mfc="none", mec=color, mew=1.5, ms=size, ls="", label=label)
+    axis.set_title(f"sky recovered, turbidity {float(value.turbidity):.3f}")
+    axis.set(xlim=(-1.05, 1.05), ylim=(-1.05, 1.05))
+    axis.set_xticks([-1, 0, 1], ["−x", "zenith", "+x"])
+    axis.set_yticks([-1, 0, 1], ["−y", "", "+y"])
+    axis.tick_params(length=0)
+    axis.spines[:].set_visible(False)
+    legend = {"loc": "lower right", "fontsize": "small", "handletextpad": 0.2}
+    axis.legend(**legend, facecolor="0.7", frameon=True)

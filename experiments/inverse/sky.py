@@ -36,7 +36,7 @@ class InverseSky:
     albedo: float = 0.5
     exposure: bool = False
     """recover the exposure too"""
-    height: int = 256
+    height: int = 400
     """of the picture, in pixels"""
 
     def __post_init__(self):

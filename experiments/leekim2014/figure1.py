@@ -53,7 +53,7 @@ def figure1(config: Figure1, context: Context) -> Table:
         panels.append(list(_panels(config, scene, full, by)))
     caption = (
         "full computation, the paper's filter, the degree it took each vertex's specular part to, "
-        f"tiles; and the differences of both from full, × {config.gain:g}"
+        "tiles; and the errors of both, red where brighter than full and blue where darker"
     )
     draw_panels(context.path("figure1.png", caption), evened(panels))
     return Table("Against the full computation", columns())
@@ -111,13 +111,11 @@ def _panels(config: Figure1, scene: Scene, full, by: dict[str, Shading]) -> Iter
     ours, theirs = by[TILES], by[FILTER]
     yield Panel(canvas.shown(full), f"full, degree {scene.row.degree}")
     yield Panel(canvas.shown(theirs.color), f"filter, {_decibels(scene, theirs, full)}")
-    yield Panel(
-        canvas.levels(theirs.reached["specular"], BASE, scene.row.degree), "degree by vertex"
-    )
+    reached = theirs.reached["specular"]
+    yield canvas.levels("specular: degree used", reached, BASE, scene.row.degree)
     yield Panel(canvas.shown(ours.color), f"tiles, {_decibels(scene, ours, full)}")
     for name, shading in (("filter", theirs), ("tiles", ours)):
-        apart = canvas.difference(shading.color, full, config.gain)
-        yield Panel(apart, f"{name} - full, × {config.gain:g}")
+        yield canvas.error(f"{name} less full", shading.color, full, config.gain)
 
 
 def _decibels(scene: Scene, shading: Shading, full: Float[Array, "v 3"]) -> str:

@@ -129,15 +129,14 @@ def _pictures(
     canvases = [Canvas.of(scene, config.size, config.samples) for scene in scenes]
     caption = (
         f"{config.sheet} frames, {config.step:g}° apart: full, the paper's filter and the degree "
-        "it takes each vertex to; how its error changes since the frame before, and that of tiles, "
-        f"× {config.gain:g}"
+        "it takes each vertex to; how its error changes since the frame before, and that of tiles"
     )
     start = (len(scenes) - config.sheet) // 2 + 1
     chosen = range(start, min(start + config.sheet, len(scenes)))
     columns = [list(_column(config, scenes[i], canvases[i], shown, i)) for i in chosen]
     rows = list(zip(*evened(columns), strict=True))
     draw_panels(context.path("frames.png", caption), rows)
-    caption = f"full, filter, and the errors of filter and tiles × {config.gain:g}, moving"
+    caption = "full, filter, and the errors of filter and tiles, moving"
     moving = [
         evened([list(_moving(config, canvas, shown, i))])[0] for i, canvas in enumerate(canvases)
     ]
@@ -151,11 +150,11 @@ def _column(
     yield Panel(canvas.shown(now.full), f"full, {config.step * i:g}°")
     yield Panel(canvas.shown(now.color), "filter")
     assert now.reached is not None
-    yield Panel(canvas.levels(now.reached, BASE, scene.row.degree), "degrees")
+    yield canvas.levels("specular: degree used", now.reached, BASE, scene.row.degree)
     for name, frames in shown.items():
         # As a difference of two colours: the errors' own.
-        apart = canvas.difference(frames[i].error, frames[i - 1].error, config.gain)
-        yield Panel(apart, f"{'filter' if name == _FILTER else name} flickers, × {config.gain:g}")
+        title = f"{'filter' if name == _FILTER else name}: error's change"
+        yield canvas.error(title, frames[i].error, frames[i - 1].error, config.gain)
 
 
 def _moving(
@@ -165,8 +164,7 @@ def _moving(
     yield Panel(canvas.shown(theirs.full), "full")
     yield Panel(canvas.shown(theirs.color), "filter")
     for name, frame in (("filter", theirs), ("tiles", ours)):
-        apart = canvas.difference(frame.color, frame.full, config.gain)
-        yield Panel(apart, f"{name}, error × {config.gain:g}")
+        yield canvas.error(f"{name}, error", frame.color, frame.full, config.gain)
 
 
 def _table(config: Figure10, context: Context) -> Table:

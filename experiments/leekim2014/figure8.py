@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from jaxsh import adaptive, harmonics, transfer
 
 from ..runner import Context, Table, experiment
-from ..shared.plots import Panel, draw_panels
+from ..shared.plots import Bar, Panel, draw_panels
 from .pictures import Canvas, Look, evened
 from .scenes import ALBEDO, Scene, Scenes, rows_or_default
 
@@ -54,7 +54,7 @@ def figure8(config: Figure8, context: Context) -> list[Table]:
         caption = (
             f"{row.mesh} under {row.environment}: diffuse light to each degree; its accumulated "
             f"change since degree {_BASE}, from blue, -{limit:.2g}, to red, +{limit:.2g}, in "
-            f"exposed linear colour; red, who is still inside at threshold "
+            f"exposed linear colour; bright, who is still inside at threshold "
             f"{config.diffuse_threshold:g}"
         )
         _draw(config, context.path(name, caption), scene, levels, limit)
@@ -109,15 +109,17 @@ def _draw(config: Figure8, path, scene: Scene, levels: list[Level], limit: float
     shown = [level for level in others if not config.shown or level.degree in config.shown]
     inside = _regions(others, config.diffuse_threshold)
     diffuse = [Panel(canvas.shown(base.color), f"degree {_BASE}, the base")]
-    change = [Panel(canvas.signed_key(limit), "change since the base")]
-    region = [Panel(canvas.region_key(), "region of interest")]
+    bar = Bar.signed("change, white is 1", limit, extend=True)
+    change = [canvas.signed("change since the base", jnp.zeros(len(base.color)), bar)]
+    everyone = jnp.ones(len(base.color), bool)
+    region = [canvas.region("region: 100 %", everyone)]
     for level in shown:
         diffuse.append(Panel(canvas.shown(level.color), f"degree {level.degree}"))
         # The mean over the channels: the largest one's sign would jump.
-        signed = canvas.signed(jnp.mean(level.change, axis=1), limit)
-        change.append(Panel(signed, f"degree {level.degree} - {_BASE}"))
+        mean = jnp.mean(level.change, axis=1)
+        change.append(canvas.signed(f"degree {level.degree} less {_BASE}", mean, bar))
         share = float(jnp.mean(inside[level.degree]))
-        region.append(Panel(canvas.region(inside[level.degree]), f"{100 * share:.0f} % inside"))
+        region.append(canvas.region(f"{100 * share:.0f} % inside", inside[level.degree]))
     draw_panels(path, evened([diffuse, change, region]))
 
 

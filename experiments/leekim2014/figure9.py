@@ -35,8 +35,8 @@ def figure9(config: Figure9, context: Context) -> Table:
         name = f"{row.mesh}_{row.environment}.png"
         caption = (
             f"{row.mesh} under {row.environment}: the paper's (a) to (d), with the degree that "
-            "each vertex was computed to; below, tiles, and differences from full, "
-            f"× {config.gain:g}"
+            "each vertex was computed to; below, tiles, and errors, red where brighter than full "
+            "and blue where darker"
         )
         _draw(config, context.path(name, caption), scene, full, by)
     return Table(
@@ -52,19 +52,25 @@ def _draw(config: Figure9, path, scene: Scene, full, by: dict[str, figure1.Shadi
     )
     target = scene.row.degree
     specular, diffuse = (
-        canvas.levels(ours.reached[kind], figure1.BASE, target) for kind in ("specular", "diffuse")
+        canvas.levels(title, ours.reached[kind], figure1.BASE, target)
+        for title, kind in (
+            ("(d) specular: degree used", "specular"),
+            ("diffuse: degree used", "diffuse"),
+        )
     )
     above = [
         Panel(canvas.shown(base.color), f"(a) base, degree {figure1.BASE}"),
         Panel(canvas.shown(full), f"(b) full, degree {target}"),
         Panel(canvas.shown(ours.color), "(c) the filter"),
-        Panel(specular, "(d) specular, degrees"),
-        Panel(diffuse, "diffuse, degrees"),
+        specular,
+        diffuse,
     ]
     below = [
-        Panel(
-            canvas.difference(one.color, full, config.gain),
-            f"{name} - full × {config.gain:g}, {scene.quality(one.color, full).image:.1f} dB",
+        canvas.error(
+            f"{name} less full, {scene.quality(one.color, full).image:.1f} dB",
+            one.color,
+            full,
+            config.gain,
         )
         for name, one in (("base", base), ("filter", ours), ("smoothed", whole), ("tiles", tiles))
     ]

@@ -14,10 +14,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from jaxsh import harmonics, imaging, sphere
+from jaxsh import harmonics, imaging, plot, sphere
 
 from ..runner import Context, Table, experiment
 from ..shared.pixels import direct_irradiance, solid_angles
@@ -40,7 +41,7 @@ class Environment:
     """environments by name; none means all that the data has"""
     degrees: tuple[int, ...] = (1, 2, 4, 6, 10)
     """degrees of the light"""
-    size: int = 384
+    size: int = 400
     """height and width of the pictures, in pixels"""
 
     def __post_init__(self):
@@ -62,7 +63,7 @@ class Shot(NamedTuple):
 def run(config: Environment, context: Context) -> list[Table]:
     mesh = context.data.mesh(config.mesh or context.data.meshes()[0])
     camera = imaging.Camera.facing(mesh, width=config.size, height=config.size)
-    view = View(mesh, imaging.rasterize(mesh, camera))
+    view = View.by(mesh, camera, samples=2)
     shade = jax.jit(sphere.irradiance)
     sheet = []
     names = config.environments or tuple(context.data.environments())
@@ -99,7 +100,7 @@ def run(config: Environment, context: Context) -> list[Table]:
                 context.record(row)
                 if window == "none":
                     shots.append(Shot(degree, light, image))
-        caption = f"{name}: the light at each degree, blue where it is negative; render; error"
+        caption = f"{name}: the light at each degree, hatched where negative; render; error"
         _draw(context.path(f"{name}.png", caption), environment, reference, shots, exposure, view)
         sheet.append((name, environment, reference, exposure))
     path = context.path("environments.png", "the reference under each environment")
@@ -170,30 +171,26 @@ def _draw(path, environment, reference, shots, exposure, view: View) -> None:
     """Columns: the probe, then each degree. Rows: light, render, error of the render."""
     columns = len(shots) + 1
     figure, axes = plt.subplots(
-        3, columns, figsize=(2.6 * columns, 6.9), height_ratios=[1, 2, 2], layout="constrained"
+        3, columns, figsize=(4 * columns, 11.4), height_ratios=[1.6, 2, 2], layout="constrained"
     )
-    height, width = 128, 256
     glow = 1 / (4 * float(jnp.mean(environment)))  # of the light itself, the mean is a quarter
-    axes[0, 0].imshow(imaging.tone_map(environment, glow), extent=(0, 2, 0, 1))
-    axes[0, 0].set_title("probe")
-    axes[1, 0].imshow(_over_white(reference, exposure, view))
+    plot.light(environment, exposure=glow, ax=axes[0, 0])
+    axes[0, 0].set_title("probe", pad=22)
+    _show(axes[1, 0], reference, exposure, view, "all pixels of the probe, summed")
+    axes[2, 0].axis("off")
     error = ScalarMappable(Normalize(-10, 10), "RdBu_r")
     for column, shot in enumerate(shots, start=1):
-        light = sphere.reconstruct_lat_long(shot.light, height, width)
-        # Negative light has no colour of its own: it is shown as pure blue.
-        shown = np.array(imaging.tone_map(light, glow))
-        shown[np.asarray(light.mean(axis=-1)) < 0] = (0.25, 0.35, 1.0)
-        axes[0, column].imshow(shown, extent=(0, 2, 0, 1))
-        axes[0, column].set_title(f"degree {shot.degree}")
-        axes[1, column].imshow(_over_white(shot.image, exposure, view))
-        difference = 100 * jnp.mean(shot.image - reference, axis=-1) * exposure
-        difference = np.where(view.raster.mask, difference, np.nan)
-        axes[2, column].imshow(difference, cmap=error.cmap, norm=error.norm)
-    for axis in axes.flat:
-        axis.axis("off")
-    scale = axes[2, 0].inset_axes((0.8, 0.1, 0.06, 0.8))
-    figure.colorbar(error, cax=scale, label="error, % of white", ticklocation="left")
-    save(figure, path, dpi=100)
+        plot.light(shot.light, exposure=glow, ax=axes[0, column])
+        axes[0, column].set_title(f"degree {shot.degree}", pad=22)
+        _show(axes[1, column], shot.image, exposure, view, f"by degree {shot.degree}")
+        alpha = np.asarray(view.raster.alpha)
+        difference = 100 * np.asarray(jnp.mean(shot.image - reference, axis=-1) * exposure)
+        colors = error.to_rgba(difference / np.maximum(alpha, 1e-6))
+        axes[2, column].imshow(np.dstack([colors[..., :3], alpha]))
+        axes[2, column].set_title("its error")
+        axes[2, column].axis("off")
+    figure.colorbar(error, ax=axes[2, 0], label="error, % of white", location="right", shrink=0.8)
+    save(figure, path)
 
 
 def _draw_sheet(path, sheet, view: View) -> None:
@@ -201,22 +198,23 @@ def _draw_sheet(path, sheet, view: View) -> None:
     figure, axes = plt.subplots(
         2,
         len(sheet),
-        figsize=(3.4 * len(sheet), 5.4),
-        height_ratios=[1, 2],
+        figsize=(4.4 * len(sheet), 6.8),
+        height_ratios=[1.2, 2],
         layout="constrained",
         squeeze=False,
     )
     for (light, render), (name, environment, reference, exposure) in zip(
         axes.T, sheet, strict=True
     ):
-        glow = 1 / (4 * float(jnp.mean(environment)))
-        light.imshow(imaging.tone_map(environment, glow), extent=(0, 2, 0, 1))
+        plot.light(environment, exposure=1 / (4 * float(jnp.mean(environment))), ax=light)
         light.set_title(name)
-        render.imshow(_over_white(reference, exposure, view))
-        light.axis("off")
-        render.axis("off")
-    save(figure, path, dpi=110)
+        _show(render, reference, exposure, view, f"lit by {name}")
+    save(figure, path)
 
 
-def _over_white(image, exposure, view: View):
-    return np.where(view.raster.mask[..., None], imaging.tone_map(image, exposure), 1.0)
+def _show(axis: Axes, image, exposure, view: View, title: str) -> None:
+    """Before white, with smooth edges."""
+    white = (1 - view.raster.alpha)[..., None]
+    axis.imshow(imaging.tone_map(exposure * image + white))
+    axis.set_title(title)
+    axis.axis("off")

@@ -42,7 +42,7 @@ class Ringing:
     """directions of the bake"""
     vertices: int = 400
     """vertices of the mesh that are looked at; 0 leaves the mesh out"""
-    size: int = 256
+    size: int = 400
     """height and width of the pictures of the mesh, in pixels"""
 
     def __post_init__(self):
@@ -89,10 +89,10 @@ def run(config: Ringing, context: Context) -> list[Table]:
         tables.append(Table("On a mesh", rows=_over_probes(shaded.rows), values={"about": about}))
         caption = (
             f"{name} under {probes[-1].name} at degree {degree}, diffuse above, a lobe of exponent "
-            f"{shaded.exponent:g} below; blue is negative"
+            f"{shaded.exponent:g} below; hatched where negative"
         )
         draw_meshes(context.path("mesh.png", caption), shaded, size=config.size)
-    caption = f"{probes[-1].name} at degree {degree}; blue is negative"
+    caption = f"{probes[-1].name} at degree {degree}; hatched where negative"
     draw_lights(context.path("light.png", caption), probes[-1].image, probes[-1].rest, degree)
     return tables
 

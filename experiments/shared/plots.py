@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import matplotlib
 
@@ -10,15 +10,19 @@ matplotlib.use("Agg")  # all pictures go to files
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.image import FigureImage
 from matplotlib.text import Text
 from matplotlib.ticker import (
     FixedLocator,
     LogLocator,
+    MaxNLocator,
     NullFormatter,
     NullLocator,
     StrMethodFormatter,
@@ -29,15 +33,39 @@ from jaxsh import geometry, imaging
 _DPI = 100
 GROUND = 0.0108  # around panels and behind objects, in exposed radiance
 
+_RELIEF = 0.25  # how much darker a false color is where the surface is seen edge on
+
 Rows = Sequence[Mapping[str, Any]]
 Behind = float | Float[Array, "h w 3"]
+Color = tuple[float, ...]
+
+
+class Bar(NamedTuple):
+    """What the colors of a panel mean, told below it: a range of numbers, or names."""
+
+    label: str
+    colors: str | Mapping[str, Color]
+    limits: tuple[float, float] = (0.0, 1.0)
+    extend: Literal["neither", "max", "both"] = "neither"
+
+    @classmethod
+    def signed(cls, label: str, limit: float, *, extend: bool = False) -> "Bar":
+        """Blue below zero, red above, full at ± limit."""
+        return cls(label, "RdBu_r", (-limit, limit), "both" if extend else "neither")
+
+    def paint(self, values: Float[ArrayLike, "*shape"]) -> Float[np.ndarray, "*shape 3"]:
+        """Colors of numbers, as a screen has them."""
+        assert isinstance(self.colors, str)
+        low, high = self.limits
+        return plt.get_cmap(self.colors)((np.asarray(values) - low) / (high - low))[..., :3]
 
 
 class Panel(NamedTuple):
-    """A picture, encoded for a screen, and the line above it."""
+    """A picture, encoded for a screen, the line above it, and what its colors mean."""
 
     image: Float[np.ndarray, "h w 3"]
     title: str = ""
+    bar: Bar | None = None
 
 
 class View(NamedTuple):
@@ -45,7 +73,14 @@ class View(NamedTuple):
 
     mesh: geometry.Mesh
     raster: imaging.Raster
+    facing: Float[Array, " v"]  # cosine between normal and viewer
     exposure: float = 1.0
+
+    @classmethod
+    def by(cls, mesh: geometry.Mesh, camera: imaging.Camera, *, samples: int = 1) -> "View":
+        towards = camera.position[None].astype(mesh.vertices.dtype) - mesh.vertices
+        cosine = jnp.sum(towards * mesh.normals, axis=1) / jnp.linalg.norm(towards, axis=1)
+        return cls(mesh, imaging.rasterize(mesh, camera, samples=samples), jnp.clip(cosine, 0, 1))
 
     @classmethod
     def of(
@@ -57,9 +92,9 @@ class View(NamedTuple):
         samples: int = 1,
     ) -> "View":
         """Exposed so that the 99th percentile of the object's pixels under the reference is 1."""
-        raster = imaging.rasterize(mesh, camera, samples=samples)
-        seen = imaging.interpolate(raster, reference)
-        return cls(mesh, raster, float(imaging.auto_exposure(seen, raster.mask)))
+        view = cls.by(mesh, camera, samples=samples)
+        seen = imaging.interpolate(view.raster, reference)
+        return view._replace(exposure=float(imaging.auto_exposure(seen, view.raster.mask)))
 
     def render(self, values: Float[Array, "v 3"], behind: Behind = 0.0) -> Float[Array, "h w 3"]:
         """Exposed radiance of the pixels, linear, before what is behind."""
@@ -70,12 +105,26 @@ class View(NamedTuple):
     ) -> Float[np.ndarray, "h w 3"]:
         return np.asarray(imaging.tone_map(self.render(values, behind)))
 
-    def difference(
-        self, values: Float[Array, "v 3"], reference: Float[Array, "v 3"], gain: float
-    ) -> Float[np.ndarray, "h w 3"]:
-        """The absolute difference, times `gain`, before black."""
-        apart = jnp.abs(self.render(values) - self.render(reference))
-        return np.asarray(imaging.tone_map(apart, gain))
+    def painted(self, values: Float[Array, " v"], bar: Bar) -> Float[np.ndarray, "h w 3"]:
+        """Numbers in the colors of the bar, a little darker where the surface turns away."""
+        both = jnp.stack([values, self.facing.astype(values.dtype)], axis=1)
+        alpha = np.asarray(self.raster.alpha)[..., None]
+        seen = np.asarray(imaging.interpolate(self.raster, both)) / np.maximum(alpha, 1e-6)
+        colors = bar.paint(seen[..., 0]) * (1 - _RELIEF * (1 - seen[..., 1:]))
+        linear = alpha * np.asarray(imaging.srgb_decode(jnp.asarray(colors)))
+        return np.asarray(imaging.srgb_encode(jnp.asarray(linear + (1 - alpha) * GROUND)))
+
+    def error(
+        self,
+        title: str,
+        values: Float[Array, "v 3"],
+        reference: Float[Array, "v 3"],
+        gain: float,
+    ) -> Panel:
+        """How much brighter than the reference, to ± 1/gain."""
+        apart = self.exposure * jnp.mean(values - reference, axis=1)
+        bar = Bar.signed("error, mean of R, G, B; white is 1", 1 / gain, extend=True)
+        return Panel(self.painted(apart, bar), title, bar)
 
     def psnr(
         self, values: Float[Array, "v 3"], reference: Float[Array, "v 3"]
@@ -89,48 +138,73 @@ class View(NamedTuple):
 def draw_panels(
     path: Path, rows: Sequence[Sequence[Panel]], *, ground: float = GROUND, letters: str = "white"
 ) -> None:
-    """Draw panels of one size, pixel by pixel, each with its title above it."""
+    """Draw panels of one size, pixel by pixel, each with its title above it and its bar below."""
+    save(_lay_out(rows, ground, letters).figure, path)
+
+
+def animate(path: Path, frames: Sequence[Sequence[Panel]]) -> None:
+    """Write a GIF: in each frame panels side by side, the bars of the first one's below them."""
+    sheet = _lay_out([frames[0]], GROUND, "white")
+    writer = PillowWriter(fps=10)
+    with writer.saving(sheet.figure, str(path), _DPI):
+        for frame in frames:
+            for image, title, panel in zip(sheet.images, sheet.titles, frame, strict=True):
+                image.set_data(panel.image)
+                title.set_text(panel.title)
+            writer.grab_frame(facecolor=sheet.figure.get_facecolor())
+    plt.close(sheet.figure)
+
+
+class _Sheet(NamedTuple):
+    figure: Figure
+    images: list[FigureImage]
+    titles: list[Text]
+
+
+def _lay_out(rows: Sequence[Sequence[Panel]], ground: float, letters: str) -> _Sheet:
     height, width, _ = rows[0][0].image.shape
     columns = max(len(row) for row in rows)
     gap = max(3, width // 60)
     letter = max(11.0, 0.045 * width)  # height of the letters, in pixels
     above = [round(2.2 * letter) if any(panel.title for panel in row) else gap for row in rows]
-    whole = columns * (width + gap) + gap, sum(above) + len(rows) * height + gap
+    below = [round(4.4 * letter) if any(panel.bar for panel in row) else 0 for row in rows]
+    whole = columns * (width + gap) + gap, sum(above) + sum(below) + len(rows) * height + gap
     figure = plt.figure(figsize=(whole[0] / _DPI, whole[1] / _DPI), dpi=_DPI)
     figure.set_facecolor(str(float(imaging.srgb_encode(jnp.asarray(ground)))))  # a grey
+    sheet = _Sheet(figure, [], [])
+    size = letter * 72 / _DPI
     for i, row in enumerate(rows):
+        top = sum(above[: i + 1]) + sum(below[:i]) + i * height
         for j, panel in enumerate(row):
-            left, top = gap + j * (width + gap), sum(above[: i + 1]) + i * height
-            figure.figimage(panel.image, left, whole[1] - top - height, origin="upper")
-            at = (left + width / 2) / whole[0], 1 - (top - above[i] / 2) / whole[1]
-            _title(figure, at, panel.title, letter, letters)
-    save(figure, path)
+            left, low = gap + j * (width + gap), whole[1] - top - height
+            sheet.images.append(figure.figimage(panel.image, left, low, origin="upper"))
+            at = (left + width / 2) / whole[0], (low + height + above[i] / 2) / whole[1]
+            text = figure.text(
+                *at, panel.title, ha="center", va="center", color=letters, fontsize=size
+            )
+            sheet.titles.append(text)
+            if panel.bar:
+                box = left + 0.1 * width, low - 1.4 * letter, 0.8 * width, 0.8 * letter
+                place = np.array(box) / [*whole, *whole]
+                _draw_bar(figure, tuple(place), panel.bar, 0.9 * size, letters)
+    return sheet
 
 
-def animate(path: Path, frames: Sequence[Sequence[Panel]]) -> None:
-    """Write a GIF: in each frame panels side by side, their titles above them."""
-    strips = [np.concatenate([panel.image for panel in frame], axis=1) for frame in frames]
-    (height, width, _), count = strips[0].shape, len(frames[0])
-    above = max(14, round(0.09 * height))
-    figure = plt.figure(figsize=(width / _DPI, (height + above) / _DPI), dpi=_DPI)
-    figure.set_facecolor("0.1")
-    shown = figure.figimage(strips[0], 0, 0, origin="upper")
-    middle = 1 - above / 2 / (height + above)
-    places = [((j + 0.5) / count, middle) for j in range(count)]
-    titles = [_title(figure, at, "", 0.5 * above, "white") for at in places]
-    writer = PillowWriter(fps=10)
-    with writer.saving(figure, str(path), _DPI):
-        for frame, strip in zip(frames, strips, strict=True):
-            shown.set_data(strip)
-            for title, panel in zip(titles, frame, strict=True):
-                title.set_text(panel.title)
-            writer.grab_frame(facecolor=figure.get_facecolor())
-    plt.close(figure)
-
-
-def _title(figure: Figure, at: tuple[float, float], text: str, pixels: float, color: str) -> Text:
-    size = pixels * 72 / _DPI
-    return figure.text(*at, text, ha="center", va="center", color=color, fontsize=size)
+def _draw_bar(
+    figure: Figure, place: tuple[float, ...], bar: Bar, size: float, letters: str
+) -> None:
+    axis = figure.add_axes(place)
+    if isinstance(bar.colors, str):
+        colors = ScalarMappable(Normalize(*bar.limits), bar.colors)
+        ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10])
+        figure.colorbar(colors, axis, orientation="horizontal", extend=bar.extend, ticks=ticks)
+    else:
+        axis.imshow([[to_rgb(color) for color in bar.colors.values()]], aspect="auto")
+        axis.set_xticks(range(len(bar.colors)), list(bar.colors))
+        axis.set_yticks([])
+    axis.set_xlabel(bar.label, color=letters, fontsize=size, labelpad=0.2 * size)
+    axis.tick_params(colors=letters, labelsize=size, length=0.3 * size, pad=0.2 * size)
+    axis.spines[:].set_color(letters)
 
 
 def save(figure: Figure, path: Path, dpi: int = _DPI) -> None:

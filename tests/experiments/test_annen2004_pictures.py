@@ -14,7 +14,7 @@ from experiments.annen2004.scenes import exact_expansion, psnr, three_lights
 from experiments.annen2004.table1 import Table1
 from experiments.runner import Context, Data
 from experiments.shared.lights import rectangle
-from experiments.shared.plots import Panel, draw_panels
+from experiments.shared.plots import Bar, Panel, draw_panels
 from experiments.shared.subjects import load
 from jaxsh import midrange
 
@@ -175,6 +175,21 @@ def test_panels_keep_their_pixels(tmp_path):
     shown = np.asarray(Image.open(tmp_path / "panels.png").convert("RGB"))
     red = (shown == [255, 0, 0]).all(axis=-1)
     assert red.sum() == 3 * 40 * 30
+
+
+def test_bars_stand_below_their_panels(tmp_path):
+    image = np.zeros((40, 60, 3), np.float32)
+    names = {"base": (1.0, 0.0, 0.0), "rest": (0.0, 0.0, 1.0)}
+    row = [Panel(image, "", Bar("part", names)), Panel(image, "", Bar.signed("error", 0.5))]
+    draw_panels(tmp_path / "panels.png", [row])
+    shown = np.asarray(Image.open(tmp_path / "panels.png").convert("RGB"))[43:]
+    red, blue = ((shown == color).all(axis=-1) for color in ([255, 0, 0], [0, 0, 255]))
+    assert red.sum() == pytest.approx(blue.sum(), rel=0.2)
+    assert np.argwhere(red)[:, 1].max() < np.argwhere(blue)[:, 1].min() < 63
+    bar = Bar.signed("error", 0.5)
+    np.testing.assert_allclose(
+        bar.paint(np.array([-0.5, 0.5]))[:, [0, 2]], [[0.02, 0.38], [0.4, 0.12]], rtol=0, atol=0.01
+    )
 
 
 def test_the_mesh_named_is_baked(tmp_path):

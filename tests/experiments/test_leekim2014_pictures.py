@@ -12,14 +12,15 @@ from PIL import Image, ImageSequence
 from experiments.annen2004.glossy import Glossy
 from experiments.leekim2014.figure8 import Figure8
 from experiments.leekim2014.figure10 import Figure10
-from experiments.leekim2014.pictures import Canvas, Look, evened, level_colors, with_key
+from experiments.leekim2014.pictures import Canvas, Look, evened, level_colors
 from experiments.leekim2014.scenes import Row, Scene, Scenes
 from experiments.leekim2014.spin import Frame, Method, flicker, play, spun
 from experiments.runner import Context, Data
 from experiments.runner.cli import main
-from experiments.shared.plots import Panel
+from experiments.shared.plots import GROUND, Bar, Panel
 from jaxsh import geometry, harmonics
 from jaxsh.adaptive import AdaptiveResult
+from jaxsh.imaging import srgb_encode
 
 KNOT = geometry.knot(400)
 SMALL = ["--directions", "32", "--size", "48", "--samples", "1"]
@@ -160,19 +161,20 @@ def test_a_method_gets_what_it_gave(scene):
 def test_false_colors(scene):
     canvas = Canvas.of(scene, 64)
     count = len(scene.mesh.vertices)
-    inside = canvas.region(jnp.ones(count, bool))
-    outside = canvas.region(jnp.zeros(count, bool))
+    inside, outside = (
+        canvas.region("", jnp.full(count, value, bool)).image for value in (True, False)
+    )
     on = (inside != outside).any(axis=-1)
-    mask = np.asarray(canvas.view.raster.mask)[:, canvas.columns]
-    assert canvas.room > 0  # the knot is as wide as the picture
-    np.testing.assert_array_equal(on[:, canvas.room :], mask)
-    assert not on[:, : canvas.room].any()
-    assert (inside[on][:, 0] > 1.5 * inside[on][:, 1]).all()
-    up, down = (canvas.signed(jnp.full(count, x), 1.0) for x in (1.0, -1.0))
+    np.testing.assert_array_equal(on, np.asarray(canvas.view.raster.mask)[:, canvas.columns])
+    assert (inside[on][:, 0] > 1.5 * inside[on][:, 2]).all()
+    bar = Bar.signed("change", 1.0)
+    up, down = (canvas.signed("", jnp.full(count, x), bar).image for x in (1.0, -1.0))
     assert (up[on][:, 0] > up[on][:, 2]).all()
     assert (down[on][:, 2] > down[on][:, 0]).all()
-    reached = canvas.levels(jnp.full(count, 3, jnp.int32), 2, 3)
-    assert reached.shape == inside.shape
+    reached = canvas.levels("", jnp.full(count, 3, jnp.int32), 2, 3)
+    assert reached.image.shape == inside.shape
+    assert reached.bar is not None
+    assert list(reached.bar.colors) == ["2", "3"]
 
 
 def test_levels_have_colors_of_their_own():
@@ -182,13 +184,19 @@ def test_levels_have_colors_of_their_own():
     assert list(level_colors(2, 2)) == [2]
 
 
-def test_a_key_leaves_the_rest_alone():
-    image = np.full((100, 120, 3), 0.5, np.float32)
-    drawn = with_key(image, {"one": (1, 0, 0), "two": (0, 0, 1)})
-    assert drawn.shape == image.shape
-    np.testing.assert_allclose(drawn[:, 60:], image[:, 60:], rtol=0, atol=0.5 / 255)
-    red, blue = ((drawn == color).all(axis=-1) for color in ([1, 0, 0], [0, 0, 1]))
-    assert np.argwhere(red)[:, 0].max() < np.argwhere(blue)[:, 0].min()
+def test_errors_are_painted_as_their_bar_says(scene):
+    """In exposed radiance: what faces the eye has the bar's color, free pixels the ground's."""
+    canvas = Canvas.of(scene, 64)
+    color = scene.full()
+    brighter = color + jnp.array([[0.0, 0.03, 0.06]], color.dtype)
+    panel = canvas.error("", brighter, color, 16.0)
+    assert panel.bar == Bar.signed("error, mean of R, G, B; white is 1", 1 / 16, extend=True)
+    view = canvas.view._replace(facing=jnp.ones_like(canvas.view.facing))
+    image = view.error("", brighter, color, 16.0).image
+    mask = np.asarray(view.raster.mask)
+    wanted = panel.bar.paint(np.full(1, 0.03))
+    np.testing.assert_allclose(image[mask], np.tile(wanted, (mask.sum(), 1)), rtol=0, atol=1e-2)
+    np.testing.assert_allclose(image[~mask], srgb_encode(jnp.asarray(GROUND)), rtol=0, atol=1e-6)
 
 
 def test_panels_are_evened():
