@@ -56,5 +56,5 @@ def draw(
         titles = ["true", *_METHODS.values()]
         for axis, title, light in zip(below.subplots(1, 3), titles, lights, strict=True):
             plot.light(light, exposure=glow, ax=axis)
-            axis.set_title(f"light of degree {harmonics.degree_of(count)}, {title}", pad=24)
+            axis.set_title(f"light of degree {harmonics.degree_of(count)}, {title}")
     save(figure, path)

@@ -175,13 +175,13 @@ def _draw(path, environment, reference, shots, exposure, view: View) -> None:
     )
     glow = 1 / (4 * float(jnp.mean(environment)))  # of the light itself, the mean is a quarter
     plot.light(environment, exposure=glow, ax=axes[0, 0])
-    axes[0, 0].set_title("probe", pad=22)
+    axes[0, 0].set_title("probe")
     _show(axes[1, 0], reference, exposure, view, "all pixels of the probe, summed")
     axes[2, 0].axis("off")
     error = ScalarMappable(Normalize(-10, 10), "RdBu_r")
     for column, shot in enumerate(shots, start=1):
         plot.light(shot.light, exposure=glow, ax=axes[0, column])
-        axes[0, column].set_title(f"degree {shot.degree}", pad=22)
+        axes[0, column].set_title(f"degree {shot.degree}")
         _show(axes[1, column], shot.image, exposure, view, f"by degree {shot.degree}")
         alpha = np.asarray(view.raster.alpha)
         difference = 100 * np.asarray(jnp.mean(shot.image - reference, axis=-1) * exposure)

@@ -28,7 +28,7 @@ def draw_lights(
     for axis, (title, light) in zip(axes.flat, lights.items(), strict=True):
         plot.light(light, height=256, exposure=exposure, ax=axis)
         title = title if title == "the picture" else f"degree {degree}, {title}"
-        axis.set_title(title, pad=22)
+        axis.set_title(title)
     save(figure, path)
 
 
@@ -44,5 +44,5 @@ def draw_meshes(path: Path, shaded: Shaded, *, size: int) -> None:
         last = View.of(shaded.mesh, camera, jnp.asarray(colors[-1], jnp.float32))
         for title, values, axis in zip(shaded.colors, colors, line, strict=True):
             plot.shaded(shaded.mesh, values, camera=camera, exposure=0.8 * last.exposure, ax=axis)
-            axis.set_title(f"{surface}, {title}", pad=22)
+            axis.set_title(f"{surface}, {title}")
     save(figure, path)
