@@ -19,10 +19,10 @@ bin := $(VENV)/bin
 # loadfile: what one file has traced serves its other tests.
 PARALLEL ?= -n auto --dist loadfile
 # Unoptimized machine code, by XLA's older way for loops on the CPU where this JAX still knows it: that
-# runs slower and compiles much faster, which is most of what tests do. Experiments, pages, examples of
-# docstrings, the oldest JAX, test-all and a plain pytest go without.
+# runs slower and compiles much faster, which is most of what tests do. Pages, examples of docstrings, the
+# oldest JAX, test-all and a plain pytest go without.
 QUICK_COMPILE ?= --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false
-LONG_RUNS := tests/experiments tests/test_documents.py
+LONG_RUNS := tests/test_documents.py
 
 .PHONY: environments reproduce report readme test test-slow test-all test-oldest test-newest test-minimal check docs package bench fuzz clean
 

@@ -120,7 +120,7 @@ def _draw(path, cases: list[Worst], bands: tuple[int, ...]) -> None:
     )
     for case, rows in zip(cases, np.split(axes, len(cases)), strict=True):
         _draw_case(figure, rows, case, bands)
-    save(figure, path, dpi=100)
+    save(figure, path, dpi=140)
 
 
 def _draw_case(figure, axes, case: Worst, bands: tuple[int, ...]) -> None:

@@ -134,4 +134,4 @@ def _draw(path, sun, turbidity: float, lights: dict[str, Array]) -> None:
     profile.set_xticks([-180, -90, 0, 90, 180], ["nadir", "horizon", "zenith", "horizon", "nadir"])
     profile.set_ylabel("luminance, in mean skies")
     profile.legend(frameon=False, ncols=3, loc="upper left")
-    save(figure, path, dpi=100)
+    save(figure, path, dpi=140)

@@ -80,8 +80,9 @@ def _filled(
     """The pixels of the mask in a larger picture, without steps within the mesh or at its edge."""
     picture = np.zeros((*mask.shape, 3))
     picture[mask] = color
-    nearest = distance_transform_edt(~mask, return_distances=False, return_indices=True)
-    picture = picture[tuple(nearest)]  # none of what is behind the mesh comes in
+    nearest = np.empty((2, *mask.shape), np.int32)
+    distance_transform_edt(~mask, return_distances=False, return_indices=True, indices=nearest)
+    picture = picture[nearest[0], nearest[1]]  # none of what is behind the mesh comes in
     alpha = np.asarray(smooth.alpha)
     scale = [wide / narrow for wide, narrow in zip(alpha.shape, mask.shape, strict=True)]
     wide = zoom(picture, (*scale, 1), order=1, mode="nearest", grid_mode=True)

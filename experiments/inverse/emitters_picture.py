@@ -18,6 +18,8 @@ from .lights import shade, with_noise
 if TYPE_CHECKING:
     from .emitters import Emitters
 
+Direction = tuple[float, float, float]
+
 _UNIT = "radii"  # of the mesh's bounding sphere: what its lengths are in
 _TRUE, _FOUND, _START = "black", "tab:orange", "0.55"
 
@@ -65,14 +67,14 @@ def draw(
     save(figure, path, dpi=100)
 
 
-def _directions(light: inverse.Rectangle) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _directions(light: inverse.Rectangle) -> tuple[Direction, Direction]:
     """From the mesh to cameras: one beside the first light, and one that sees it from its edge."""
     towards = np.asarray(light.center) / np.linalg.norm(light.center)
     across = np.cross(towards, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
     up = np.array([0.0, 0.0, 0.3])
-    ahead, aside = 0.8 * towards + across + up, across + up
-    return tuple(ahead.tolist()), tuple(aside.tolist())
+    (x, y, z), (u, v, w) = (0.8 * towards + across + up).tolist(), (across + up).tolist()
+    return (x, y, z), (u, v, w)
 
 
 def _draw_aside(
@@ -80,7 +82,7 @@ def _draw_aside(
     mesh: geometry.Mesh,
     color: Float[Array, "v 3"],
     scene: Scene,
-    view: tuple[tuple[float, ...], int, float],
+    view: tuple[Direction, int, float],
 ) -> None:
     toward, size, exposure = view
     outlines = {
@@ -89,8 +91,8 @@ def _draw_aside(
         "recovered": ([light.vertices for light in scene.found], _FOUND, "--", 2.0),
     }
     corners = [np.asarray(each) for light, *_ in outlines.values() for each in light]
-    points = np.concatenate([np.asarray(mesh.vertices), *corners])
-    everything = geometry.Mesh(points, mesh.faces, np.zeros_like(points))
+    points = jnp.asarray(np.concatenate([np.asarray(mesh.vertices), *corners]))
+    everything = geometry.Mesh(points, mesh.faces, jnp.zeros_like(points))
     camera = imaging.Camera.facing(everything, toward=toward, width=size, height=size, margin=0.1)
     plot.shaded(
         mesh, jnp.maximum(color, 0), camera=camera, exposure=exposure, length=_UNIT, ax=axis

@@ -55,6 +55,6 @@ def draw(
         glow = 0.5 / (float(picture.truth[:, 0].mean()) / np.sqrt(4 * np.pi))
         titles = ["true", *_METHODS.values()]
         for axis, title, light in zip(below.subplots(1, 3), titles, lights, strict=True):
-            plot.light(light, exposure=glow, ax=axis)
+            plot.light(light, height=256, exposure=glow, ax=axis)
             axis.set_title(f"light of degree {harmonics.degree_of(count)}, {title}")
     save(figure, path)

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from matplotlib.patches import Circle
+from matplotlib.axes import Axes
 
-from jaxsh import geometry, imaging, inverse, sky
+from jaxsh import geometry, imaging, inverse, plot, sky, sphere
 
 from ..shared.plots import View, plt, save
 
@@ -70,31 +70,19 @@ def draw_sky(
     save(figure, path)
 
 
-def _draw_dome(axis, value: inverse.SkyLight, sun: Float[np.ndarray, " 3"]) -> None:
-    """The hemisphere from below, zenith in the middle, equal areas; rings around both suns."""
-    x, y = np.meshgrid(*[np.linspace(-1, 1, _DOME)] * 2)
-    squared = x * x + y * y
-    # Lambert's projection: |p|² = 1 - z. What lies beyond the horizon is cut off below.
-    z = np.maximum(1 - squared, 0.0)
-    stretch = np.sqrt(1 + z)
-    views = np.stack([x * stretch, y * stretch, z], axis=-1)
-    views = jnp.asarray(views / np.linalg.norm(views, axis=-1, keepdims=True))
-    seen = sky.preetham_radiance(views, value.sun, value.turbidity, check="allow")
-    level = float(jnp.mean(seen[jnp.asarray(squared <= 1)]))
-    shown = imaging.tone_map(seen, 0.6 / level, curve="reinhard", white=4.0)
-    image = axis.imshow(shown, extent=(-1, 1, -1, 1), origin="lower", interpolation="bilinear")
-    horizon = Circle((0, 0), 1, facecolor="none", edgecolor="0.4", transform=axis.transData)
-    axis.add_patch(horizon)
-    image.set_clip_path(horizon)
-    suns = (sun, "black", 13, "true sun"), (np.asarray(value.sun), "white", 8, "recovered")
-    for direction, color, size, label in suns:
-        place = direction[:2] / np.sqrt(1 + direction[2])
-        axis.plot(*place, "o", mfc="none", mec=color, mew=1.5, ms=size, ls="", label=label)
+def _draw_dome(axis: Axes, value: inverse.SkyLight, sun: Float[np.ndarray, " 3"]) -> None:
+    """The sky recovered, and around its sun a ring where the true one is."""
+
+    def radiance(views: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
+        views = views.astype(value.sun.dtype)
+        return sky.preetham_radiance(views, value.sun, value.turbidity, check="allow")
+
+    grid = sphere.lat_long(64, 128)
+    above = grid.directions[:, 2] > 0
+    level = float(jnp.sum(radiance(grid.directions[above]).mean(axis=1) * grid.weights[above]))
+    curve = {"exposure": 0.6 * 2 * np.pi / level, "curve": "reinhard", "white": 4.0}
+    plot.dome(radiance, suns=value.sun, **curve, resolution=_DOME, ax=axis)
+    place = sun[:2] / np.sqrt(1 + sun[2])  # in equal areas, as the dome is
+    axis.plot(*place, "o", mfc="none", mec="black", mew=1.5, ms=20, ls="", label="true sun")
+    axis.legend(loc="lower right", fontsize="small", frameon=False)
     axis.set_title(f"sky recovered, turbidity {float(value.turbidity):.3f}")
-    axis.set(xlim=(-1.05, 1.05), ylim=(-1.05, 1.05))
-    axis.set_xticks([-1, 0, 1], ["−x", "zenith", "+x"])
-    axis.set_yticks([-1, 0, 1], ["−y", "", "+y"])
-    axis.tick_params(length=0)
-    axis.spines[:].set_visible(False)
-    legend = {"loc": "lower right", "fontsize": "small", "handletextpad": 0.2}
-    axis.legend(**legend, facecolor="0.7", frameon=True)

@@ -112,7 +112,7 @@ def _draw(config: Figure8, path, scene: Scene, levels: list[Level], limit: float
     bar = Bar.signed("change, white is 1", limit, extend=True)
     change = [canvas.signed("change since the base", jnp.zeros(len(base.color)), bar)]
     everyone = jnp.ones(len(base.color), bool)
-    region = [canvas.region("region: 100 %", everyone)]
+    region = [canvas.region("100 % inside", everyone)]
     for level in shown:
         diffuse.append(Panel(canvas.shown(level.color), f"degree {level.degree}"))
         # The mean over the channels: the largest one's sign would jump.

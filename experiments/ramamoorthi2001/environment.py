@@ -180,7 +180,7 @@ def _draw(path, environment, reference, shots, exposure, view: View) -> None:
     axes[2, 0].axis("off")
     error = ScalarMappable(Normalize(-10, 10), "RdBu_r")
     for column, shot in enumerate(shots, start=1):
-        plot.light(shot.light, exposure=glow, ax=axes[0, column])
+        plot.light(shot.light, height=256, exposure=glow, ax=axes[0, column])
         axes[0, column].set_title(f"degree {shot.degree}")
         _show(axes[1, column], shot.image, exposure, view, f"by degree {shot.degree}")
         alpha = np.asarray(view.raster.alpha)

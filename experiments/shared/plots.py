@@ -37,7 +37,7 @@ _RELIEF = 0.25  # how much darker a false color is where the surface is seen edg
 
 Rows = Sequence[Mapping[str, Any]]
 Behind = float | Float[Array, "h w 3"]
-Color = tuple[float, ...]
+Color = tuple[float, float, float]
 
 
 class Bar(NamedTuple):
@@ -184,20 +184,17 @@ def _lay_out(rows: Sequence[Sequence[Panel]], ground: float, letters: str) -> _S
             )
             sheet.titles.append(text)
             if panel.bar:
-                box = left + 0.1 * width, low - 1.4 * letter, 0.8 * width, 0.8 * letter
-                place = np.array(box) / [*whole, *whole]
-                _draw_bar(figure, tuple(place), panel.bar, 0.9 * size, letters)
+                corner = (left + 0.1 * width) / whole[0], (low - 1.4 * letter) / whole[1]
+                place = *corner, 0.8 * width / whole[0], 0.8 * letter / whole[1]
+                _draw_bar(figure.add_axes(place), panel.bar, 0.9 * size, letters)
     return sheet
 
 
-def _draw_bar(
-    figure: Figure, place: tuple[float, ...], bar: Bar, size: float, letters: str
-) -> None:
-    axis = figure.add_axes(place)
+def _draw_bar(axis: Axes, bar: Bar, size: float, letters: str) -> None:
     if isinstance(bar.colors, str):
         colors = ScalarMappable(Normalize(*bar.limits), bar.colors)
         ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10])
-        figure.colorbar(colors, axis, orientation="horizontal", extend=bar.extend, ticks=ticks)
+        plt.colorbar(colors, axis, orientation="horizontal", extend=bar.extend, ticks=ticks)
     else:
         axis.imshow([[to_rgb(color) for color in bar.colors.values()]], aspect="auto")
         axis.set_xticks(range(len(bar.colors)), list(bar.colors))

@@ -190,11 +190,12 @@ def test_errors_are_painted_as_their_bar_says(scene):
     color = scene.full()
     brighter = color + jnp.array([[0.0, 0.03, 0.06]], color.dtype)
     panel = canvas.error("", brighter, color, 16.0)
-    assert panel.bar == Bar.signed("error, mean of R, G, B; white is 1", 1 / 16, extend=True)
+    bar = Bar.signed("error, mean of R, G, B; white is 1", 1 / 16, extend=True)
+    assert panel.bar == bar
     view = canvas.view._replace(facing=jnp.ones_like(canvas.view.facing))
     image = view.error("", brighter, color, 16.0).image
     mask = np.asarray(view.raster.mask)
-    wanted = panel.bar.paint(np.full(1, 0.03))
+    wanted = bar.paint(np.full(1, 0.03))
     np.testing.assert_allclose(image[mask], np.tile(wanted, (mask.sum(), 1)), rtol=0, atol=1e-2)
     np.testing.assert_allclose(image[~mask], srgb_encode(jnp.asarray(GROUND)), rtol=0, atol=1e-6)
 
