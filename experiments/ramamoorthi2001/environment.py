@@ -171,7 +171,7 @@ def _draw(path, environment, reference, shots, exposure, view: View) -> None:
     """Columns: the probe, then each degree. Rows: light, render, error of the render."""
     columns = len(shots) + 1
     figure, axes = plt.subplots(
-        3, columns, figsize=(4 * columns, 11.4), height_ratios=[1.6, 2, 2], layout="constrained"
+        3, columns, figsize=(4 * columns, 11), height_ratios=[1.35, 2, 2], layout="constrained"
     )
     glow = 1 / (4 * float(jnp.mean(environment)))  # of the light itself, the mean is a quarter
     plot.light(environment, exposure=glow, ax=axes[0, 0])
@@ -181,7 +181,7 @@ def _draw(path, environment, reference, shots, exposure, view: View) -> None:
     error = ScalarMappable(Normalize(-10, 10), "RdBu_r")
     for column, shot in enumerate(shots, start=1):
         plot.light(shot.light, height=256, exposure=glow, ax=axes[0, column])
-        axes[0, column].set_title(f"degree {shot.degree}")
+        axes[0, column].set(title=f"degree {shot.degree}", ylabel="", yticklabels=[])
         _show(axes[1, column], shot.image, exposure, view, f"by degree {shot.degree}")
         alpha = np.asarray(view.raster.alpha)
         difference = 100 * np.asarray(jnp.mean(shot.image - reference, axis=-1) * exposure)
@@ -189,7 +189,8 @@ def _draw(path, environment, reference, shots, exposure, view: View) -> None:
         axes[2, column].imshow(np.dstack([colors[..., :3], alpha]))
         axes[2, column].set_title("its error")
         axes[2, column].axis("off")
-    figure.colorbar(error, ax=axes[2, 0], label="error, % of white", location="right", shrink=0.8)
+    scale = axes[2, 0].inset_axes((0.8, 0.1, 0.06, 0.8))
+    figure.colorbar(error, cax=scale, label="error, % of white", ticklocation="left")
     save(figure, path)
 
 
