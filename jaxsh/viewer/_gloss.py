@@ -11,6 +11,7 @@ from ..transfer._glossy_kernels import lobe_polynomial, product_nodes
 
 # What the menu offers besides the material's own; beyond that a lobe of degree 10 hardly changes.
 _EXPONENTS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
+_MOST_BYTES = 512 << 20  # of graphics memory
 
 
 def split_material(albedo: Any) -> tuple[Float[ArrayLike, "..."], Material | None]:
@@ -25,9 +26,17 @@ def split_material(albedo: Any) -> tuple[Float[ArrayLike, "..."], Material | Non
     return albedo.diffuse, albedo
 
 
-def gloss_facts(material: Material, degree: int) -> dict[str, Any]:
-    """List directions, their weights, and the lobe's polynomials, for the header."""
+def gloss_facts(material: Material, degree: int, count: int) -> dict[str, Any]:
+    """List directions, their weights, and the lobe's polynomials, for the header.
+
+    Raises `ValueError` where the transfer at the directions would fill a graphics processor.
+    """
     nodes = product_nodes(degree)
+    if (size := 4 * count * len(nodes.directions)) > _MOST_BYTES:
+        raise ValueError(
+            f"expected at most {_MOST_BYTES >> 20} MiB for gloss of degree {degree}, but {count} "
+            f"points take {size >> 20} MiB; cut the light to a lower degree"
+        )
     own = float(material.exponent)
     exponents = sorted({*_EXPONENTS, own})
     lobes = lobe_polynomial(jnp.asarray(exponents, jnp.result_type(float)), degree, True)

@@ -103,7 +103,7 @@ def lamp_samples(
     dtype = jnp.result_type(float)
     grid = lamp.grid
     if grid is None:
-        grid = grid_around(jnp.asarray(positions, dtype), _SHAPE)
+        grid = grid_around(jnp.asarray(_box(positions), dtype), _SHAPE)
     if isinstance(lamp.light, Expansion):
         if lamp.light.degree < degree:
             raise ValueError(
@@ -114,6 +114,13 @@ def lamp_samples(
     points = jnp.asarray(grid.points, dtype)
     ball = Sphere(jnp.asarray(lamp_place(lamp), dtype), lamp.light.radius, lamp.light.radiance)
     return grid, make_expansion(points, *sphere_harmonics_with_gradient(ball, points, degree))
+
+
+def _box(positions: Float[np.ndarray, "v 3"]) -> Float[np.ndarray, "2 3"]:
+    """Two corners around a mesh; a flat one gets a height, since a grid needs one."""
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    lacking = np.maximum(0.05 * (high - low).max() - (high - low), 0) / 2
+    return np.stack([low - lacking, high + lacking])
 
 
 def lamp_radiance(

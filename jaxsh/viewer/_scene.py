@@ -107,14 +107,16 @@ def make_scene(
     }
     header |= lights.facts
     if material is not None:
-        header["glossy"] = gloss_facts(material, lights.degree)
+        header["glossy"] = gloss_facts(material, lights.degree, count)
     arrays = lights.arrays | {
         "positions": positions.astype("<f4"),
         "faces": corners.astype("<u4"),
         "transfer": layers.astype("<i2"),
     }
     if material is not None:
-        arrays["normals"] = np.asarray(transfer.normals).astype("<f4")
+        normals = np.asarray(transfer.normals)
+        defined = np.isfinite(normals).all(axis=1, keepdims=True)
+        arrays["normals"] = np.where(defined, normals, 0).astype("<f4")
     if codes is not None:
         arrays["albedoCodes"] = codes.astype("<u2")
     return packed(header, arrays | value_codes)

@@ -15,7 +15,7 @@ import pytest
 import viewer_pages as pages
 
 from jaxsh import geometry, harmonics, midrange, sky, transfer, viewer
-from jaxsh.viewer import _lamp, _lights
+from jaxsh.viewer import _gloss, _lamp, _lights
 
 DEGREE = 6
 NODE = shutil.which("node")
@@ -143,6 +143,21 @@ def test_gloss_that_differs_by_vertex_is_refused(tmp_path):
     material = transfer.Material(albedo, albedo, 8.0)
     with pytest.raises(ValueError, match="expected a material with one specular albedo"):
         viewer.export_html(tmp_path / "a.html", made, light, mesh.faces, material)
+
+
+def test_gloss_that_would_fill_the_memory_is_refused():
+    material = transfer.Material(0.5, 0.5, 8.0)
+    with pytest.raises(ValueError, match="expected at most 512 MiB for gloss of degree 10, but"):
+        _gloss.gloss_facts(material, 10, 400_000)
+
+
+def test_a_flat_mesh_has_a_grid_around_it():
+    flat = np.array([[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
+    facts, terms = _lamp.lamp_part(viewer.Lamp(ball()), flat, 1)
+    assert terms is None
+    lower, upper = (np.array(facts["grid"][end]) for end in ("lower", "upper"))
+    assert (upper > lower).all()
+    np.testing.assert_allclose((lower + upper) / 2, [1.0, 0.5, 1.0], rtol=0, atol=1e-12)
 
 
 def test_a_sky_is_as_bright_as_the_light_beside_it():
