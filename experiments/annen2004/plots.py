@@ -16,18 +16,17 @@ _SCENES: dict[str, LineStyleType] = {"with the blocker": "-", "without it": "--"
 
 
 def draw_distances(path: Path, rows: list[dict[str, Any]]) -> None:
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(13, 4.8), layout="constrained")
     methods = list(dict.fromkeys(row["method"] for row in rows))
     first, edges = "first order", "first order, edge gradient"
     paper = [
-        (first, "with the blocker", "C3", "with the blocker"),
-        (first, "without it", "C2", "without it"),
-        (edges, "with the blocker", "C0", "with the blocker, edge gradient"),
+        (first, "with the blocker", "C1", "with the blocker (the paper's red curve)"),
+        (first, "without it", "C1", "without it (the paper's green curve)"),
+        (edges, "with the blocker", "C4", "with the blocker, edge gradient"),
     ]
     for method, scene, color, label in paper:
-        left.plot(
-            *curve(rows, "distance", "error", method=method, scene=scene), color=color, label=label
-        )
+        curved = curve(rows, "distance", "error", method=method, scene=scene)
+        left.plot(*curved, _SCENES[scene], color=color, label=label)
     left.set_title("as the paper's figure 8: first order")
     left.legend(frameon=False)
     left.set_ylim(bottom=0)
@@ -40,7 +39,9 @@ def draw_distances(path: Path, rows: list[dict[str, Any]]) -> None:
     right.set_title("all orders")
     handles, labels = right.get_legend_handles_labels()
     handles += [Line2D([], [], color="grey", linestyle=style) for style in _SCENES.values()]
-    right.legend(handles, [*labels, *_SCENES], frameon=False, fontsize=9)
+    right.legend(
+        handles, [*labels, *_SCENES], frameon=False, loc="center left", bbox_to_anchor=(1, 0.5)
+    )
     for axis in (left, right):
         axis.set_xlabel("distance from the sample, in the object's radius")
         axis.set_ylabel("RMS error of radiance (red), %")

@@ -30,6 +30,14 @@ from matplotlib.ticker import (
 
 from jaxsh import geometry, imaging
 
+# Told apart without red and green (Okabe and Ito, 2008, and three more).
+plt.rcParams["axes.prop_cycle"] = plt.cycler(
+    color=[
+        *("#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7"),
+        *("#7a4b1e", "#56b4e9", "#808080", "#b3a200", "#000000"),
+    ]
+)
+
 _DPI = 100
 GROUND = 0.0108  # around panels and behind objects, in exposed radiance
 

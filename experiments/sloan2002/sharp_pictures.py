@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jaxsh import imaging
 
-from ..shared.plots import Panel, draw_panels, plain_numbers, plt, save
+from ..shared.plots import GROUND, Panel, draw_panels, plain_numbers, plt, save
 
 
 def draw_comparison(
@@ -17,18 +17,18 @@ def draw_comparison(
 ) -> None:
     """Columns: ways of shading by their titles, the reference last. Rows: matte, glossy."""
     rows = []
-    for surface in range(2):
+    for surface, name in enumerate(("matte", "glossy")):
         images = {
             title: imaging.interpolate(raster, jnp.asarray(both[surface]))
             for title, both in shaded.items()
         }
         exposure = imaging.auto_exposure(list(images.values())[-1], raster.mask)
-        behind = 0.02 * (1 - raster.alpha)[..., None]
+        behind = GROUND * (1 - raster.alpha)[..., None]
         rows.append(
             [
                 Panel(
                     np.asarray(imaging.tone_map(exposure * image + behind)),
-                    title if surface == 0 else "",
+                    f"{name}, {title}",
                 )
                 for title, image in images.items()
             ]
@@ -54,8 +54,10 @@ def draw_scan(path: Path, rows: list[dict[str, Any]]) -> None:
             ])  # fmt: skip
 
         for probe in probes:
-            axis.plot(values, [mean(v, [probe]) for v in values], marker=".", label=probe)
-        axis.plot(values, [mean(v, probes) for v in values], color="black", lw=2.5, label="mean")
+            axis.plot(values, [mean(v, [probe]) for v in values], marker="o", label=probe)
+        if len(probes) > 1:
+            mean_of_all = [mean(v, probes) for v in values]
+            axis.plot(values, mean_of_all, color="black", lw=2.5, label="mean")
         axis.set_xscale("log")
         axis.set_yscale("log")
         for each in (axis.xaxis, axis.yaxis):
