@@ -10,6 +10,7 @@ matplotlib.use("Agg")  # all pictures go to files
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
+from cycler import cycler
 from jaxtyping import Array, ArrayLike, Float
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
@@ -31,7 +32,7 @@ from matplotlib.ticker import (
 from jaxsh import geometry, imaging
 
 # Told apart without red and green (Okabe and Ito, 2008, and three more).
-plt.rcParams["axes.prop_cycle"] = plt.cycler(
+plt.rcParams["axes.prop_cycle"] = cycler(
     color=[
         *("#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7"),
         *("#7a4b1e", "#56b4e9", "#808080", "#b3a200", "#000000"),
