@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import NullFormatter
 from matplotlib.typing import LineStyleType
 
@@ -64,15 +65,17 @@ def draw_claims(path: Path, rows: list[dict[str, Any]], methods: Sequence[str], 
             values[counts.index(row["samples"]), distances.index(row["distance"])] = row["psnr"]
         image = axis.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=15, vmax=60)
         for (i, j), value in np.ndenumerate(values):
-            color = "black" if value > 42 else "white"
-            axis.text(j, i, f"{value:.0f}", ha="center", va="center", color=color)
+            color, around = ("black", "white") if value > 42 else ("white", "black")
+            halo = [withStroke(linewidth=2, foreground=around, alpha=0.6)]
+            place = {"ha": "center", "va": "center"}
+            axis.text(j, i, f"{value:.0f}", color=color, path_effects=halo, **place)
         place = np.interp(2 * box, distances, np.arange(len(distances)), left=-1, right=-1)
         if place >= 0:
-            axis.axvline(float(place), color="white", linestyle="--")
+            axis.axvline(float(place), color="white", linestyle="--", linewidth=1, alpha=0.7)
         axis.set_xticks(range(len(distances)), [f"{d:g}" for d in distances])
         axis.set_yticks(range(len(counts)), [str(count) for count in counts])
         axis.set_title(method, fontsize=10)
-        axis.set_xlabel("distance of the lights")
+        axis.set_xlabel("distance of the lights, in radii")
     axes[0].set_ylabel("samples")
     if image is not None:
         figure.colorbar(image, ax=list(axes), label="PSNR, dB", extend="both")

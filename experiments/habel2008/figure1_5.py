@@ -38,7 +38,7 @@ class Figure15:
     """pictures between sunrise and sunset"""
     sheet: int = 8
     """pictures on the contact sheet"""
-    height: int = 180
+    height: int = 400
     """of a picture, in pixels; its width is 4/3 of it"""
     samples: int = 2
     """rays along each side of a pixel"""
