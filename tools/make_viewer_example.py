@@ -1,9 +1,9 @@
-"""Make the page and the pictures of `docs/viewer.md`: a knot under three lights.
+"""Make the page and the pictures of `docs/viewer.md`: a knot under several lights.
 
-python tools/make_viewer_example.py docs
+python tools/make_viewer_example.py docs [--pictures]
 
-The pictures need the package playwright and a Chromium that is installed; `CHROMIUM=path` names
-one.
+The pictures, with `--pictures` these alone, need the package playwright and a Chromium that is
+installed; `CHROMIUM=path` names one.
 """
 
 import os
@@ -59,6 +59,21 @@ def values_of(mesh: geometry.Mesh, baked: transfer.Transfer, light: ArrayLike) -
     }
 
 
+# Each picture: its name, its size, whether it is dark, and what the page is set to.
+PICTURES = (
+    (
+        "viewer",
+        (1200, 640),
+        False,
+        "viewer.set({ compare: true }); viewer.choose(1); viewer.set({ index: 2, degree: 6 }); "
+        "viewer.choose(0); viewer.pick(...SPOT)",
+    ),
+    ("viewer_levels", (960, 560), False, "viewer.chooseLook(3)"),
+    ("viewer_phone", (390, 760), True, "viewer.chooseLook(1)"),
+)
+SPOT = "[250, 150]"  # of the page, on the knot
+
+
 def make_pictures(page: Path, folder: Path) -> None:
     from playwright.sync_api import sync_playwright
 
@@ -66,19 +81,24 @@ def make_pictures(page: Path, folder: Path) -> None:
     options = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with sync_playwright() as started:
         browser = started.chromium.launch(executable_path=chromium, args=[*options, "--no-sandbox"])
-        shown = browser.new_page(viewport={"width": 960, "height": 540})
-        shown.goto(page.resolve().as_uri())
-        shown.locator("main canvas").first.wait_for()
-        for name, light in (("viewer", 0), ("viewer-lamp", 3)):
-            shown.evaluate(
-                "(index) => document.getElementById('viewer').viewer.set({ index })", light
+        for name, (width, height), dark, state in PICTURES:
+            shown = browser.new_page(
+                viewport={"width": width, "height": height},
+                color_scheme="dark" if dark else "light",
+                device_scale_factor=1,
             )
-            shown.wait_for_timeout(500)
+            shown.goto(page.resolve().as_uri())
+            shown.locator("main canvas").first.wait_for()
+            shown.evaluate("globalThis.viewer = document.getElementById('viewer').viewer")
+            shown.evaluate(state.replace("...SPOT", f"...{SPOT}"))
+            shown.wait_for_timeout(1000)
             shown.screenshot(path=folder / f"{name}.png")
+            shown.close()
         browser.close()
 
 
 if __name__ == "__main__":
     docs = Path(sys.argv[1])
-    make_page(docs / "examples" / "viewer.html")
+    if "--pictures" not in sys.argv:
+        make_page(docs / "examples" / "viewer.html")
     make_pictures(docs / "examples" / "viewer.html", docs / "images")
