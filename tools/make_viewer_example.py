@@ -50,7 +50,7 @@ def values_of(mesh: geometry.Mesh, baked: transfer.Transfer, light: ArrayLike) -
     seen = baked.coefficients[:, 0] * np.sqrt(4 / np.pi)  # 1 without shadows and bounces
     material = transfer.Material(0.5, 0.3, 20.0)
     eye = imaging.Camera.facing(mesh).position
-    method = adaptive.Levels(threshold=0.1)
+    method = adaptive.Levels(threshold=0.1, rings=1)
     result = adaptive.shade(light, baked, eye, material, method)
     kept = np.asarray(result.shown_degree["specular"])
     return {
@@ -65,13 +65,14 @@ PICTURES = (
         "viewer",
         (1200, 640),
         False,
-        "viewer.set({ compare: true }); viewer.choose(1); viewer.set({ index: 2, degree: 6 }); "
+        "viewer.set({ compare: true }); viewer.choose(1); viewer.set({ index: 2, window: 'hann' }); "
         "viewer.choose(0); viewer.pick(...SPOT)",
     ),
-    ("viewer_levels", (960, 560), False, "viewer.chooseLook(3)"),
-    ("viewer_phone", (390, 760), True, "viewer.chooseLook(1)"),
+    ("viewer-lamp", (960, 540), False, "viewer.set({ index: 3 })"),
+    ("viewer-levels", (960, 560), False, "viewer.chooseLook(3)"),
+    ("viewer-phone", (390, 760), True, "viewer.chooseLook(1)"),
 )
-SPOT = "[250, 150]"  # of the page, on the knot
+SPOT = "[340, 245]"  # of the page, on the knot
 
 
 def make_pictures(page: Path, folder: Path) -> None:
