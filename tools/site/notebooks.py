@@ -1,6 +1,7 @@
 """The notebooks as tutorials: executed, and shown with their pictures. A hook of MkDocs."""
 
 import base64
+import math
 import os
 import re
 from collections.abc import Iterator
@@ -27,7 +28,7 @@ def on_files(files: Files, config: Any, **_: Any) -> Files:
             files.append(File.generated(config, f"tutorials/{name}", content=data))
         title, about = _opening(notebook)
         cards.append(
-            f"-   [![{title}]({next(iter(pictures))})]({path.stem}.md)\n\n"
+            f"-   [![{title}]({_card(path.stem, pictures)})]({path.stem}.md)\n\n"
             f"    **[{title}]({path.stem}.md)**\n\n    {about}"
         )
     listed = "\n\n".join(cards)
@@ -42,6 +43,21 @@ Each tutorial is a notebook of the checkout's `notebooks/`, executed while this 
 it prints and draws is what came out. They run without data, and end with an exercise. Open
 one yourself with `jupyter lab notebooks/`.
 """
+
+
+# Pictures that show best what a tutorial is about, where that is not the one of a card's shape.
+_CARDS = {"02_light_a_mesh": 2, "05_adaptive": 0}
+
+
+def _card(stem: str, pictures: dict[str, bytes]) -> str:
+    """Name of the picture that stands for a tutorial: nearest to 16 : 9, unless it is chosen."""
+
+    def stretch(name: str) -> float:
+        width, height = (int.from_bytes(pictures[name][at : at + 4]) for at in (16, 20))
+        return abs(math.log(width / height * 9 / 16))
+
+    names = list(pictures)
+    return names[_CARDS[stem]] if stem in _CARDS else min(names, key=stretch)
 
 
 def _opening(notebook: nbformat.NotebookNode) -> tuple[str, str]:
