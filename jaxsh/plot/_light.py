@@ -1,11 +1,14 @@
 """A light as a lat-long picture."""
 
+import math
+from typing import Literal
+
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
 
-from .._core.checks import check_number, check_size
+from .._core.checks import check_choice, check_number, check_size
 from ..imaging import auto_exposure, tone_map
 from ..sphere import reconstruct_lat_long
 from ._axes import flat_axes
@@ -18,6 +21,8 @@ def light(
     *,
     height: int = 128,
     exposure: float | None = None,
+    curve: Literal["clip", "reinhard"] = "clip",
+    white: float = math.inf,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw a light as a lat-long picture, tone-mapped, with negative radiance marked.
@@ -35,6 +40,7 @@ def light(
     - `height`: rows of the picture that coefficients are drawn as; it has twice as many columns.
     - `exposure`: factor before the tone curve; by default the one that takes the 99th percentile
       of the pixels to white.
+    - `curve`, `white`: see `imaging.tone_map`.
     - `ax`: axes to draw on; by default those of a new figure.
 
     **Returns**
@@ -52,16 +58,19 @@ def light(
     """
     ax = None if ax is None else flat_axes(ax, (7.0, 4.0))
     height = check_size("height", height)
+    check_choice("curve", curve, ("clip", "reinhard"))
+    white = check_number("white", white, above=0.0, infinite=True)
     if exposure is not None:
         exposure = check_number("exposure", exposure, least=0.0)
     picture = _picture(light, height)
     shown = jnp.asarray(picture)
     if exposure is None:
         exposure = float(auto_exposure(shown))
-    encoded = np.asarray(tone_map(shown, exposure))
+    colors = jnp.broadcast_to(shown, (*shown.shape[:2], 3))
+    encoded = np.asarray(tone_map(colors, exposure, curve=curve, white=white))
     ax = flat_axes(ax, (7.0, 4.0))
     ax.imshow(
-        np.broadcast_to(encoded, (*encoded.shape[:2], 3)),
+        encoded,
         extent=(0, 360, 180, 0),
         aspect="equal",
         interpolation="nearest",

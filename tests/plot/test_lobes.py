@@ -32,12 +32,12 @@ def test_lobes_stand_where_the_function_is_large():
 
 def test_a_balloon_is_drawn_true_to_scale():
     """Of y_10 a ball |z| remains: of diameter 1 around (0, 0, ±1/2), as is known of ω·|cosθ|."""
-    (ax,) = plot.lobes(np.array([0, 0, 1.0, 0]), toward=(0, -1, 0), resolution=256)
+    (ax,) = plot.lobes(np.array([0, 0, 1.0, 0]), toward=(0, -1, 0), resolution=SMALL)
     alpha = picture(ax)[..., 3]
-    x, z = np.meshgrid(*2 * [1.12 * ((np.arange(256) + 0.5) / 128 - 1)])
+    x, z = np.meshgrid(*2 * [1.12 * ((np.arange(SMALL) + 0.5) / SMALL * 2 - 1)])
     expected = np.minimum(np.hypot(x, z - 0.5), np.hypot(x, z + 0.5)) < 0.5
-    unsure = ndimage.binary_dilation(expected, iterations=2) & ~ndimage.binary_erosion(
-        expected, iterations=2
+    unsure = ndimage.binary_dilation(expected, iterations=1) & ~ndimage.binary_erosion(
+        expected, iterations=1
     )
     unsure |= np.hypot(x, z) < 0.15  # where the faces are as large as the balls are apart
     np.testing.assert_array_equal(alpha[~unsure] > 0.5, expected[~unsure])
@@ -76,10 +76,10 @@ def test_lobes_keep_a_grid_and_take_axes():
     grid = plot.lobes(jnp.eye(4).reshape(2, 2, 4), titles="abcd", resolution=4)
     assert [ax.get_title() for ax in grid] == list("abcd")
     own = Figure().add_subplot()
-    assert plot.lobes(np.array([1.0]), ax=own, resolution=4)[0] is own
+    assert plot.lobes(np.ones(4), ax=own, resolution=4)[0] is own
     before = pyplot.get_fignums()
     axes = Figure().subplots(1, 2)
-    assert list(plot.lobes(np.ones((2, 1)), ax=axes, resolution=4)) == list(axes)
+    assert list(plot.lobes(np.ones((2, 4)), ax=axes, resolution=4)) == list(axes)
     assert pyplot.get_fignums() == before
     assert plot.lobes(np.zeros(4), resolution=4)[0].texts[3:] == []  # no scale of nothing
 

@@ -16,8 +16,7 @@ from jaxsh import harmonics, imaging, plot, sphere
 MAGENTA = (255, 0, 255)
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("array", [np.asarray, jnp.asarray])
+@pytest.mark.parametrize(("array", "dtype"), [(np.asarray, np.float32), (jnp.asarray, np.float64)])
 def test_light_shows_the_function_at_its_directions(rng, dtype, array):
     coefficients = rng.normal(size=(3, 9)) * 0.05
     coefficients[:, 0] = 3  # positive everywhere: nothing is marked
@@ -92,10 +91,9 @@ def test_light_refuses(light, message, unchecked):
         plot.light(light)
 
 
-@pytest.mark.parametrize("array", [np.asarray, jnp.asarray])
-def test_bands_are_the_power_of_each_degree(rng, array):
+def test_bands_are_the_power_of_each_degree(rng):
     light = rng.normal(size=(3, 16))
-    ax = plot.bands(array(light), labels=["R", "G", "B"])
+    ax = plot.bands(jnp.asarray(light), labels=["R", "G", "B"])
     lines = [line.get_ydata() for line in ax.get_lines()]
     # Parseval, against a quadrature that is exact for squares of degree 3.
     quadrature = sphere.gauss_legendre(6)

@@ -83,6 +83,7 @@ def test_kinds_have_a_color_each():
     assert near(below, 158, 12)
 
 
+@pytest.mark.slow
 def test_a_picture_is_cut_to_the_mesh_and_smooth_at_its_edge():
     knot = geometry.knot(300)
     ax = plot.vertices(knot, knot.vertices[:, 2], label="z", colorbar=False)

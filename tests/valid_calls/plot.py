@@ -108,7 +108,7 @@ def calls():
             free="label unit length values",
             slow=True,
         ),
-        "light": of(p.light, light=one, height=4, exposure=1.0, ax=ax, finite="light", slow=True),
+        "light": of(p.light, light=one, height=4, **tone, ax=ax, finite="light", slow=True),
         "lobes": of(
             p.lobes,
             titles=["f"],
