@@ -76,6 +76,7 @@ def test_gradients_refuse(unchecked):
         plot.gradients(points[:0], points[:0])
 
 
+@pytest.mark.slow
 def test_transfer_lobes_stand_at_their_vertices():
     seen = np.asarray(imaging.rasterize(KNOT, CAMERA, samples=2).face)
     vertex = int(KNOT.faces[seen[seen >= 0][40]][0])
@@ -108,6 +109,7 @@ def test_transfer_lobes_stand_at_their_vertices():
         plot.transfer_lobes(KNOT, round_[:4], camera=CAMERA)
 
 
+@pytest.mark.slow
 def test_every_picture_can_be_read_on_a_dark_ground():
     """Text stands out from what it is on: it follows the style, or is outlined or in a cell."""
     with pyplot.style.context("dark_background"):

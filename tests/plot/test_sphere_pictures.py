@@ -51,6 +51,7 @@ def test_a_ball_shows_what_it_says(rng, of):
         assert "+y" not in names
 
 
+@pytest.mark.slow
 def test_a_ball_takes_pictures_and_marks_negative_light():
     picture = np.ones((16, 32, 3), np.float32)
     picture[:8] = 0.2  # above, dark

@@ -97,6 +97,7 @@ def test_a_picture_is_cut_to_the_mesh_and_smooth_at_its_edge():
     assert ax.figure.axes == [ax]
 
 
+@pytest.mark.slow
 def test_relief_darkens_what_is_seen_edge_on():
     ball = geometry.make_mesh(np.asarray(geometry.knot(300).vertices), geometry.knot(300).faces)
     camera = imaging.Camera.facing(ball, width=64, height=64)
