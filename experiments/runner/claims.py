@@ -53,7 +53,7 @@ class Claim:
     def say(self, value: float) -> str:
         """A number of its kind, with the unit."""
         number = f"{value:.3g}" if self.digits is None else f"{value:.{self.digits}f}"
-        return f"{number} {self.unit}".rstrip()
+        return f"{number}{'' if self.unit == '°' else ' '}{self.unit}".rstrip()
 
 
 @dataclasses.dataclass(frozen=True)
