@@ -11,7 +11,7 @@ from .._core.checks import check_flag, check_type
 from ..harmonics import degree_of, degrees, orders
 from ._arrays import check_labels, read_coefficients
 from ._axes import color_bar, panels
-from ._colors import color_scale
+from ._colors import color_scale, text_on
 
 _NUMBERS = 4  # the highest degree at which numbers fit into their squares
 
@@ -99,9 +99,8 @@ def _draw(ax: Axes, function, degree: int, scale, numbers: bool) -> None:
         ax.plot(x.T, y.T, color="0.7", linewidth=0.5)
     if numbers:
         for l, m, value in zip(rows, columns - degree, function, strict=True):
-            dark = abs(scale.norm(value) - 0.5) > 0.33
             said = f"{value:.2g}".replace("-", "−")
-            color = "white" if dark else "black"
+            color = text_on(scale.colors(np.asarray(value)))
             ax.text(m, l, said, ha="center", va="center", color=color, fontsize="small")
     ax.set(xlim=(-degree - 0.55, degree + 0.55), ylim=(degree + 0.55, -0.55))
     for axis in (ax.xaxis, ax.yaxis):

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.colors import Colormap, LogNorm, Normalize
 
+from .._core import srgb
 from .._core.checks import check_number, described
 
 POSITIVE = "#e07b39"
@@ -71,6 +72,12 @@ def _bounds(limits: Any) -> tuple[float | None, float | None]:
             raise ValueError(f"expected limits with low < high, got ({low:g}, {high:g})")
         return low, high
     return None, check_number("limits", limits, above=0.0)
+
+
+def text_on(color: Float[np.ndarray, " 3"]) -> str:
+    """Choose black or white, whichever has more contrast with an encoded color (WCAG 2)."""
+    light = float(luminance(srgb.decode(np.asarray(color))))
+    return "black" if (light + 0.05) ** 2 > 1.05 * 0.05 else "white"
 
 
 def luminance(radiance: Float[np.ndarray, "*shape c"]) -> Float[np.ndarray, "*shape"]:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from .._core.checks import check_flag, check_type
 from ._arrays import read
 from ._axes import color_bar, flat_axes
-from ._colors import color_scale
+from ._colors import color_scale, text_on
 
 
 def error_map(
@@ -92,7 +92,7 @@ def _draw_numbers(ax: Axes, values, x, y, scale) -> None:
     ax.imshow(values, origin="lower", aspect="auto", cmap=scale.cmap, norm=scale.norm)
     colors = scale.colors(values)
     for (i, j), value in np.ndenumerate(values):
-        color = "black" if colors[i, j] @ (0.299, 0.587, 0.114) > 0.5 else "white"
+        color = text_on(colors[i, j])
         said = f"{value:.3g}".replace("-", "−")
         ax.text(j, i, said, ha="center", va="center", color=color, fontsize="small")
     ax.set_xticks(range(len(x)), [f"{one:g}" for one in x])
