@@ -10,7 +10,6 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.colors import Colormap, LogNorm, Normalize
 
-from .._core import srgb
 from .._core.checks import check_number, described
 
 POSITIVE = "#e07b39"
@@ -75,9 +74,8 @@ def _bounds(limits: Any) -> tuple[float | None, float | None]:
 
 
 def text_on(color: Float[np.ndarray, " 3"]) -> str:
-    """Choose black or white, whichever has more contrast with an encoded color (WCAG 2)."""
-    light = float(luminance(srgb.decode(np.asarray(color))))
-    return "black" if (light + 0.05) ** 2 > 1.05 * 0.05 else "white"
+    """Choose black or white, whichever stands out from an encoded color (luma of Rec. 601)."""
+    return "black" if float(np.dot(color, (0.299, 0.587, 0.114))) > 0.5 else "white"
 
 
 def luminance(radiance: Float[np.ndarray, "*shape c"]) -> Float[np.ndarray, "*shape"]:
