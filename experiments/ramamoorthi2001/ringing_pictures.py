@@ -37,7 +37,7 @@ def draw_meshes(path: Path, shaded: Shaded, *, size: int) -> None:
     camera = imaging.Camera.facing(shaded.mesh, width=size, height=size)
     rows = list(zip(*shaded.colors.values(), strict=True))
     figure, axes = plt.subplots(
-        2, len(shaded.colors), figsize=(4 * len(shaded.colors), 9.2), layout="constrained"
+        2, len(shaded.colors), figsize=(4 * len(shaded.colors), 10.8), layout="constrained"
     )
     for surface, colors, line in zip(("diffuse", "glossy"), rows, axes, strict=True):
         # All at the exposure of the last, whose sources are traced.
