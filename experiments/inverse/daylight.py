@@ -30,7 +30,6 @@ _DOUBTS = 12.0, 5.0, 2.0, 0.7
 _NODES = 2**14
 # Where rays start above the surface, in the mesh's longest extent.
 _OFFSET = 1e-3
-_SHOWN = 400  # pixels of the picture's height
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,12 +60,10 @@ class InverseDaylight:
 
 
 class View(NamedTuple):
-    """What one picture shows of a mesh, pixel by pixel, and what each pixel sees."""
+    """Points of a mesh, pixels of one picture or all vertices, and what each of them sees."""
 
-    raster: imaging.Raster
-    smooth: imaging.Raster  # the same in many pixels, to be looked at
     scene: geometry.RayScene
-    baked: transfer.Transfer  # of the P pixels on the mesh
+    baked: transfer.Transfer  # of the P points
     normals: Float[np.ndarray, "p 3"]
     origins: Float[np.ndarray, "p 3"]  # of rays
     directions: Float[np.ndarray, "n 3"]
@@ -118,7 +115,7 @@ class Truth(NamedTuple):
 
 @experiment("inverse.daylight", x64=True)
 def run(config: InverseDaylight, context: Context) -> Table:
-    view, name = _view(config, context)
+    name, mesh, view, whole = _views(config, context)
     shown = []
     for kind in config.skies:
         # Without a sun all pictures are the same.
@@ -132,52 +129,72 @@ def run(config: InverseDaylight, context: Context) -> Table:
                 found = _find(way, observed, view, config)
                 context.record(_row(number, way, truth, found, config))
                 if number == 0 and way == config.ways[-1]:
-                    again = _render(found.value, view, config)
+                    # Of the vertices, as one sees them: the fit's pixels are few.
+                    observed = _picture(truth, whole, config.albedo, shadows=way != "none")
+                    again = _render(found.value, whole, config)
                     seen = Truth(
                         config.model, np.asarray(found.value.sun), float(found.value.turbidity)
                     )
                     shown.append(Shown(truth, observed, again, found.value, seen))
     caption = (
-        "observed, and as rendered from the light that was found, smooth between the pixels; the "
-        "true light and the one found, with circles where the suns are"
+        f"the mesh as it is lit, of which {config.height} × {config.height} pixels with noise were "
+        "observed, and as the light that was found lights it; the true light and the one found, "
+        "circles where the suns are"
     )
-    mask = np.asarray(view.raster.mask)
-    draw(context.path("recovered.png", caption), view.smooth, mask, shown)
+    draw(context.path("recovered.png", caption), mesh, shown)
     about = {"name": name, "pixels": len(view.free)}
     return Table("Daylight from one picture", rows=_rows(config, context), values=about)
 
 
-def _view(config: InverseDaylight, context: Context) -> tuple[View, str]:
-    """Positions, normals and transfer of pixels are those of the vertices, interpolated."""
+def _views(config: InverseDaylight, context: Context) -> tuple[str, geometry.Mesh, View, View]:
+    """The pixels of the picture, and all vertices: what is fitted, and what is shown.
+
+    Positions, normals and transfer of pixels are those of the vertices, interpolated.
+    """
     name, mesh, baked = load(context, config.mesh, _DEGREE, directions=config.directions)
     camera = imaging.Camera.facing(mesh, width=config.height, height=config.height)
     scene = geometry.ray_scene(mesh)
     raster = imaging.rasterize(mesh, camera, scene=scene)
-    large = dataclasses.replace(camera, width=_SHOWN, height=_SHOWN)
-    smooth = imaging.rasterize(mesh, large, scene=scene, samples=2)
     on = np.asarray(raster.mask)
+    if not on.any():
+        raise UserError(f"no pixel of {config.height} is on {name}: raise the height")
 
     def of_pixels(values):
         return np.asarray(imaging.interpolate(raster, values), np.float64)[on]
 
-    positions, normals = of_pixels(mesh.vertices), of_pixels(mesh.normals)
+    whole = tuple(
+        np.asarray(values, np.float64)
+        for values in (baked.coefficients, mesh.vertices, mesh.normals)
+    )
+    pixels = tuple(map(of_pixels, (baked.coefficients, mesh.vertices, mesh.normals)))
+    views = [_view(mesh, scene, values, config.directions, context) for values in (pixels, whole)]
+    return name, mesh, views[0], views[1]
+
+
+def _view(
+    mesh: geometry.Mesh,
+    scene: geometry.RayScene,
+    values: tuple[np.ndarray, ...],
+    count: int,
+    context: Context,
+) -> View:
+    """Of these coefficients, positions and normals, with rays into so many directions."""
+    coefficients, positions, normals = values
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    if not len(positions):
-        raise UserError(f"no pixel of {config.height} is on {name}: raise the height")
-    pixels = transfer.Transfer(
-        jnp.asarray(of_pixels(baked.coefficients)),
+    baked = transfer.Transfer(
+        jnp.asarray(coefficients),
         jnp.asarray(positions),
         jnp.asarray(normals),
         jnp.arange(len(positions), dtype=jnp.int32)[:, None],
     )
-    directions = np.asarray(sphere.fibonacci(config.directions).directions, np.float64)
+    directions = np.asarray(sphere.fibonacci(count).directions, np.float64)
     extent = np.ptp(np.asarray(mesh.vertices, np.float64), axis=0).max()
     origins = positions + _OFFSET * extent * normals
     free = np.zeros((len(positions), len(directions)), bool)
     for at, direction in enumerate(context.progress(directions, "rays")):
         out = normals @ direction > 0
         free[out, at] = ~scene.occluded(origins[out], direction)
-    return View(raster, smooth, scene, pixels, normals, origins, directions, free), name
+    return View(scene, baked, normals, origins, directions, free)
 
 
 def _truths(kind: Sky, count: int, seed: int) -> list[Truth]:
