@@ -16,7 +16,7 @@ from jaxsh import harmonics, imaging, transfer, viewer
 from jaxsh.viewer._script import script, text
 
 CHROMIUM = pages.chromium()
-playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium, which is not here"),
@@ -28,17 +28,6 @@ AS_TEXT = """(values) => {
   for (const byte of bytes) text += String.fromCharCode(byte);
   return btoa(text);
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    options = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    with playwright.sync_playwright() as started:
-        launched = started.chromium.launch(
-            executable_path=CHROMIUM, args=[*options, "--no-sandbox"]
-        )
-        yield launched
-        launched.close()
 
 
 def opened(browser, file, faults: list[str]):
@@ -208,7 +197,7 @@ HARNESS = """async ([code, header, text]) => {
   const { default: widget } = await import(URL.createObjectURL(
     new Blob([code], { type: "text/javascript" })));
   const listeners = {};
-  const state = { lights: header.lights, height: 300 };
+  const state = { lights: header.lights, height: 300, moved: {} };
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   globalThis.model = {
     get: (name) => state[name],

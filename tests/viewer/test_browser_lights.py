@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import viewer_pages as pages
-from test_browser import CHROMIUM, browser, colors, levels, opened  # noqa: F401
+from test_browser import CHROMIUM, colors, levels, opened
 from test_lights import DEGREE, ball
 
 from jaxsh import harmonics, imaging, midrange, sky, transfer, viewer
@@ -27,7 +27,7 @@ def file(tmp_path_factory):
 
 
 @pytest.fixture
-def page(browser, file):  # noqa: F811
+def page(browser, file):
     faults = []
     page = opened(browser, file, faults)
     yield page
@@ -138,7 +138,7 @@ def test_a_lamp_shades_as_midrange_does_and_is_dragged(page):
     assert page.evaluate("viewer.state.lamp") != place.tolist()
 
 
-def test_a_lamp_that_was_captured_moves_with_its_light(browser, tmp_path, rng):  # noqa: F811
+def test_a_lamp_that_was_captured_moves_with_its_light(browser, tmp_path, rng):
     mesh, made, _, albedo = pages.example()
     positions = np.asarray(made.positions, np.float64)
     low, high = positions.min(axis=0) - 0.5, positions.max(axis=0) + 0.5
@@ -179,7 +179,7 @@ def test_a_lamp_that_was_captured_moves_with_its_light(browser, tmp_path, rng): 
     page.context.close()
 
 
-def test_gloss_is_shade_glossy_from_every_eye(browser, tmp_path):  # noqa: F811
+def test_gloss_is_shade_glossy_from_every_eye(browser, tmp_path):
     mesh, made, light, albedo = pages.example()
     degree, made, light = 4, made.truncated(4), jnp.asarray(light[:, :25])
     material = transfer.Material(albedo, jnp.array([0.5, 0.4, 0.3]), 12.0)

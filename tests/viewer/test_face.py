@@ -12,7 +12,7 @@ import pytest
 import viewer_pages as pages
 from PIL import Image
 from scipy.ndimage import binary_erosion
-from test_browser import CHROMIUM, browser, colors, levels, opened, read  # noqa: F401
+from test_browser import CHROMIUM, levels, opened, read
 
 from jaxsh import harmonics, imaging, transfer, viewer
 
@@ -38,7 +38,7 @@ def scene():
 
 
 @pytest.fixture(scope="module")
-def window(browser, scene, tmp_path_factory):  # noqa: F811
+def window(browser, scene, tmp_path_factory):
     mesh, made, light, values = scene
     path = tmp_path_factory.mktemp("face") / "knot.html"
     camera = imaging.Camera.facing(mesh, width=WIDTH, height=HEIGHT)

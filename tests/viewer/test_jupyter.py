@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 import viewer_pages as pages
-from test_browser import CHROMIUM, browser, colors, levels  # noqa: F401
+from test_browser import CHROMIUM, colors, levels
 
 from jaxsh import transfer
 
@@ -91,7 +91,7 @@ def address(tmp_path_factory):
         server.wait(30)
 
 
-def test_a_cell_relights_what_another_shows(browser, address):  # noqa: F811
+def test_a_cell_relights_what_another_shows(browser, address):
     _, made, light, albedo = pages.example()
     window = browser.new_context(viewport={"width": 1280, "height": 900})
     page = window.new_page()
