@@ -105,7 +105,7 @@ def main(vertices: int, degree: int, options: str, seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Count changes of light a second.")
     parser.add_argument("--vertices", type=int, default=50_000)
     parser.add_argument("--degree", type=int, default=10)
     parser.add_argument("--chromium-options", default=SOFTWARE)
