@@ -211,6 +211,10 @@ def test_the_png_is_transparent_beside_the_mesh_and_smooth(page):
     page.evaluate("viewer.chooseLook(2)")
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save PNG").click()
+    page.wait_for_timeout(300)
+    middle = {"x": 150, "y": 200, "width": 200, "height": 200}
+    with Image.open(io.BytesIO(page.screenshot(clip=middle))) as image:
+        assert np.ptp(np.asarray(image.convert("L")).astype(int)) > 20  # the mesh is still seen
     with Image.open(io.BytesIO(saved.value.path().read_bytes())) as image:
         pixels = np.asarray(image).astype(int)
     size = page.evaluate("[viewer.canvas.height, viewer.canvas.width]")

@@ -169,6 +169,7 @@ export class Viewer {
       context.translate(12, height / scale - barHeight(facts) - 12);
       drawBar(context, facts, "black", "rgb(255 255 255 / 0.85)");
     });
+    this.#draw(false); // a browser empties the canvas once anything is drawn, elsewhere too
   }
 
   // Python of the view.
