@@ -19,10 +19,9 @@ bin := $(VENV)/bin
 # loadfile: what one file has traced serves its other tests.
 PARALLEL ?= -n auto --dist loadfile
 # Unoptimized machine code, by XLA's older way for loops on the CPU where this JAX still knows it: that
-# runs slower and compiles much faster, which is most of what tests do. Pages, examples of docstrings, the
-# oldest JAX, test-all and a plain pytest go without.
+# runs slower and compiles much faster, which is most of what tests do. Examples of docstrings, the oldest
+# JAX, test-all and a plain pytest go without.
 QUICK_COMPILE ?= --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false
-LONG_RUNS := tests/test_documents.py
 
 .PHONY: environments reproduce report readme test test-slow test-all test-oldest test-newest test-minimal check docs package bench fuzz clean
 
@@ -80,8 +79,7 @@ test: $(VENV)/installed
 
 test-slow: $(VENV)/installed
 	$(bin)/python -m pytest $(PARALLEL) jaxsh
-	$(call quickly,$(VENV)) -m slow tests $(LONG_RUNS:%=--ignore=%)
-	$(bin)/python -m pytest $(PARALLEL) -m slow $(LONG_RUNS)
+	$(call quickly,$(VENV)) -m slow tests
 
 test-all: $(VENV)/installed
 	$(bin)/python -m pytest $(PARALLEL) -m ""
