@@ -13,7 +13,7 @@ from .._core.checks import check_batches, check_degree, check_flag, check_functi
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
 from ..harmonics import degrees, evaluate, orders, rotate_z
-from ._angles import directions, each_sun, parameter
+from ._angles import directions, each_sun, parameter, unit
 from ._color import Space, check_space
 from ._preetham import Constants, preetham_constants, preetham_radiance
 from ._validity import Check, check_option, check_sun, check_turbidity
@@ -45,9 +45,9 @@ def project(
 
     **Arguments**
 
-    - `model`: `model(view, sun, *parameters)` with view (n, 3) unit vectors, sun (3,) and each
-      parameter a scalar gives radiance (n, C). It is traced; pass the same function object to
-      have it compiled once.
+    - `model`: `model(view, sun, *parameters)` with view (n, 3) and sun (3,) unit vectors and
+      each parameter a scalar gives radiance (n, C). It is traced; pass the same function object
+      to have it compiled once.
     - `sun`: (..., 3), of any length; `parameters`: (...) each. Batches broadcast. Differentiable
       in all, the zenith included.
     - `symmetric`: promise that the sky is its own mirror image in the plane of sun and zenith.
@@ -163,7 +163,7 @@ def _integrate(model, degree, sun, parameters, *, symmetric: bool, refine: int =
         axis=-1,
     )
     views = views.reshape(-1, 3)
-    values = model(views, sun, *parameters)
+    values = model(views, unit(sun), *parameters)
     if values.ndim != 2 or len(values) != len(views):
         raise ValueError(
             f"a model must return radiance (n, channels) for n = {len(views)} views, got shape "

@@ -49,6 +49,19 @@ def test_against_graded_panels(elevation):
         assert relative_error(found, expected) < 3e-13
 
 
+def test_a_model_meets_a_sun_of_unit_length():
+    """Whatever length was given, to rounding."""
+
+    def glow(view, sun, haze):
+        return jnp.exp(haze * (view @ sun))[:, None]
+
+    sun = np.array([0.6, 0.0, 0.8])
+    expected = sky.project(glow, sun, 1.5, degree=2)
+    for length in (1e-3, 7.0):
+        found = sky.project(glow, length * sun, 1.5, degree=2)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-15 * abs(expected).max())
+
+
 @pytest.mark.parametrize("degree", [6, pytest.param(32, marks=pytest.mark.slow)])
 def test_twice_the_nodes_change_nothing(degree):
     suns, turbidities = (a.ravel() for a in np.meshgrid(ELEVATIONS, TURBIDITIES))
