@@ -33,6 +33,9 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile("jaxsh")
 
+# Parts of programs that `test_documents.py` puts together: importing one runs it.
+collect_ignore = ["documents"]
+
 
 @pytest.fixture
 def rng(request) -> np.random.Generator:
