@@ -20,8 +20,6 @@ import numpy as np
 import pytest
 import sharding
 
-collect_ignore = ["documents"]  # programs that run before those of a page
-
 jax.config.update("jax_num_cpu_devices", 2)  # for the tests of sharding
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
