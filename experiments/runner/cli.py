@@ -37,6 +37,7 @@ from .config import fill, override
 from .data import VARIABLE, Data
 from .errors import UserError, unknown
 from .registry import Entry, entries, load
+from .results import damaged
 from .run import Job
 
 _PROGRAM = "python -m experiments"
@@ -125,6 +126,10 @@ def _report(arguments: list[str]) -> int:
 
         code = overview.run_due(overview.due(chapters, options.preset), run)
         chapters = overview.collect(known, options.names, options.out, options.preset)
+    for chapter in chapters:
+        for entry, _ in chapter.runs:
+            for said in damaged(entry, options.out):
+                print(f"warning: {said}", file=sys.stderr)
     print(*overview.write_pages(chapters, options.out, _PROGRAM + " report"), sep="\n")
     return code
 

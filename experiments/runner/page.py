@@ -1,6 +1,7 @@
 """The report as one HTML page that needs no other file and no network."""
 
 import base64
+import contextlib
 import html as escaping
 import io
 import re
@@ -183,10 +184,11 @@ def _embedded(path: Path) -> str:
         from PIL import Image
 
         small = io.BytesIO()
-        with Image.open(path) as picture:
+        # One that is cut short is taken as it is: the page's caption says what it should be.
+        with contextlib.suppress(OSError), Image.open(path) as picture:
             picture.thumbnail((_WIDEST, 8 * _WIDEST))
             picture.save(small, "WEBP", quality=90)
-        content, kind = small.getvalue(), "image/webp"
+            content, kind = small.getvalue(), "image/webp"
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 

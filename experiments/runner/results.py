@@ -1,16 +1,16 @@
 """The results that are there: what each run left, and whether it still says what the code does."""
 
+import contextlib
 import dataclasses
 import functools
 import json
 import re
 import shlex
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .errors import UserError
 from .registry import Entry
 from .sources import changed
 
@@ -41,18 +41,39 @@ class Run:
     @functools.cached_property
     def rows(self) -> list[dict[str, Any]]:
         """Every recorded row."""
-        return _json(self.folder / "metrics.json")
+        return [dict(row) for row in _json(self.folder / "metrics.json")]
 
     @functools.cached_property
     def environment(self) -> dict[str, Any]:
         """What it ran on."""
-        return _json(self.folder / "environment.json")
+        return dict(_json(self.folder / "environment.json"))
+
+    @functools.cached_property
+    def config(self) -> dict[str, Any]:
+        """What it ran with."""
+        text = (self.folder / "config.toml").read_text(encoding="utf-8")
+        return dict(tomllib.loads(text).get(self.preset, {}))
+
+    @functools.cached_property
+    def damage(self) -> str:
+        """What in the folder is not what a run writes, or "" where all is, or nothing is there."""
+        if not self.folder.exists():
+            return ""
+        for file, read in _READ.items():
+            try:
+                read(self)
+            except (FileNotFoundError, NotADirectoryError):
+                return f"{file} is missing"
+            except KeyError as error:
+                return f"{file} does not say {error}"
+            except (AttributeError, IndexError, OSError, TypeError, ValueError) as error:
+                return f"{file} is not what a run writes ({error})"
+        return ""
 
     @functools.cached_property
     def stale(self) -> str:
         """Why the results are not what a run would give now, or "" where nothing says so."""
-        config = tomllib.loads((self.folder / "config.toml").read_text(encoding="utf-8"))
-        ran, wanted = config.get(self.preset, {}), self.entry.presets.get(self.preset)
+        ran, wanted = self.config, self.entry.presets.get(self.preset)
         if wanted is None:
             return f"the preset {self.preset!r} is gone"
         if self.overrides:
@@ -126,25 +147,38 @@ class Run:
         return [(said, self.folder / name) for said, name in found if (self.folder / name).exists()]
 
 
+# What the report reads of each file.
+_READ: dict[str, Callable[[Run], object]] = {
+    "metrics.json": lambda run: run.rows,
+    "environment.json": lambda run: (
+        run.environment["status"],
+        (run.overrides, run.machine, run.about, run.date, f"{run.seconds:g}"),
+        dict(run.environment.get("sources", {})),
+    ),
+    "config.toml": lambda run: run.config,
+    "table.md": lambda run: (run.tables, run.pictures),
+}
+
+
 def find(entry: Entry, out: Path, preset: str | None = None) -> Run | None:
     """The complete results of `preset`; of "paper", else of the newest, where none is named."""
     wanted = [preset] if preset else list(entry.presets)
-    runs = []
-    for name in wanted:
-        folder = out / entry.name / name
-        needed = ("metrics.json", "environment.json", "config.toml", "table.md")
-        if all((folder / file).exists() for file in needed):
-            run = Run(entry, name, folder)
-            if run.environment.get("status") == "complete":
-                runs.append(run)
-    return max(runs, key=lambda run: (run.preset == "paper", run.environment["date"]), default=None)
+    runs = [Run(entry, name, out / entry.name / name) for name in wanted]
+    there = [run for run in runs if run.folder.exists() and not run.damage]
+    complete = [run for run in there if run.environment["status"] == "complete"]
+    return max(
+        complete, key=lambda run: (run.preset == "paper", run.environment["date"]), default=None
+    )
+
+
+def damaged(entry: Entry, out: Path) -> list[str]:
+    """Each folder whose results cannot be read, and why."""
+    runs = [Run(entry, name, out / entry.name / name) for name in entry.presets]
+    return [f"{run.folder}: {run.damage}" for run in runs if run.damage]
 
 
 def _json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise UserError(f"{str(path)!r} is not what a run writes: {error}") from None
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def _tables(text: str) -> Iterator[Shown]:
@@ -155,6 +189,8 @@ def _tables(text: str) -> Iterator[Shown]:
         cells = [_cells(line) for line in lines if line.startswith("| ")]
         note = " ".join(line for line in lines if line and not line.startswith("| "))
         if cells:
+            if any(len(row) != len(cells[0]) for row in cells):
+                raise ValueError(f"rows of several lengths below {title!r}")
             heads, groups = _heads(cells[0])
             yield Shown(title, heads, groups, cells[2:], note)
 
@@ -226,12 +262,14 @@ def is_number(cell: str) -> bool:
 
 
 def unfinished(entry: Entry, out: Path) -> str:
-    """How the last run ended that left no results, or ""."""
+    """How the last run ended that left no results, or why they cannot be read, or ""."""
     for preset in entry.presets:
-        path = out / entry.name / f"{preset}.partial" / "environment.json"
-        if path.exists():
-            ran = _json(path)
-            return f"{ran['status']} on {ran['date'][:10]}"
+        if damage := Run(entry, preset, out / entry.name / preset).damage:
+            return f"{preset}, {damage}"
+        partial = Run(entry, preset, out / entry.name / f"{preset}.partial")
+        if partial.folder.exists():
+            with contextlib.suppress(KeyError, OSError, TypeError, ValueError):
+                return f"{partial.environment['status']} on {partial.date}"
     return ""
 
 

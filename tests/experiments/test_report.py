@@ -1,5 +1,6 @@
 """The page over all results, its verdicts, and what it says of missing and stale ones."""
 
+import html
 import html.parser
 import os
 import re
@@ -197,6 +198,39 @@ def test_a_failure_does_not_keep_the_others(toy_paper):
     assert code == 1
     assert "1 of 2 failed: toy" in stderr
     assert "last run: failed on " in page
+    assert "a draw: at least 0" in page
+
+
+def test_results_that_cannot_be_read_are_told_and_run_anew(toy_paper):
+    toy_paper.run("toy")
+    folder = toy_paper.out / "toy" / "quick"
+    for file, content, why in (
+        ("metrics.json", b"[{", "metrics.json is not what a run writes (Expecting"),
+        ("metrics.json", b"3", "metrics.json is not what a run writes ("),
+        ("environment.json", b"[]", "environment.json does not say 'status'"),
+        ("environment.json", b'{"status": "complete"}', "environment.json does not say 'command'"),
+        ("environment.json", b"\xff", "environment.json is not what a run writes ("),
+        ("config.toml", b"quick = [", "config.toml is not what a run writes ("),
+        (
+            "table.md",
+            b"## A\n\n| a | b |\n| --- | --- |\n| 1 |\n",
+            "rows of several lengths below 'A'",
+        ),
+        ("table.md", None, "table.md is missing"),
+    ):
+        whole = (folder / file).read_bytes()
+        (folder / file).unlink() if content is None else (folder / file).write_bytes(content)
+        code, _, stderr, page, markdown = report(toy_paper)
+        assert code == 0
+        assert f"warning: {folder}: " in stderr
+        assert why in stderr
+        assert why in html.unescape(page)
+        assert why in markdown
+        (folder / file).write_bytes(whole)
+    (folder / "metrics.json").write_text("")
+    code, _, stderr, page, _ = report(toy_paper, "--all")
+    assert code == 0
+    assert "warning:" not in stderr
     assert "a draw: at least 0" in page
 
 
