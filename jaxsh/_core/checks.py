@@ -79,12 +79,17 @@ def as_host_integer(value: Any, name: str) -> Int[np.ndarray, "..."]:
 
 
 def _as_host_array(value: Any, name: str, wanted: str) -> np.ndarray:
-    if isinstance(value, Tracer):
-        raise ValueError(f"expected known values for {name}, got traced ones: {_ON_HOST}")
+    check_known(name, value)
     try:
         return np.asarray(value)
     except (TypeError, ValueError):  # lists of several lengths
         raise ValueError(f"expected {wanted} for {name}, got {described(value)}") from None
+
+
+def check_known(name: str, value: Any) -> None:
+    """Raises `ValueError` where the value, or a leaf of it, is traced."""
+    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(value)):
+        raise ValueError(f"expected known values for {name}, got traced ones: {_ON_HOST}")
 
 
 def as_finite(

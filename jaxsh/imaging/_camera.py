@@ -9,7 +9,15 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from .._core.checks import as_finite, as_float, check_number, check_size, check_type, described
+from .._core.checks import (
+    as_finite,
+    as_float,
+    check_known,
+    check_number,
+    check_size,
+    check_type,
+    described,
+)
 from ..geometry import Mesh
 
 
@@ -90,7 +98,8 @@ class Camera(eqx.Module):
 
         `toward` points from the mesh to the camera (default: from its front, -y, and a little
         above). `margin` is the share of the picture's half width or height left free around it.
-        Runs on the host, outside `jit`.
+        Vertices that are in no face do not count. Runs on the host, outside `jit`. Raises
+        `ValueError` for a mesh all in one point.
 
         **Example**
 
@@ -100,6 +109,7 @@ class Camera(eqx.Module):
         True
         """
         check_type("mesh", mesh, Mesh)
+        check_known("mesh", mesh)
         fov_y, margin = check_number("fov_y", fov_y), check_number("margin", margin, least=0.0)
         if margin >= 1:
             raise ValueError(f"margin must be below 1, got {margin:g}")
@@ -111,9 +121,10 @@ class Camera(eqx.Module):
             height=height,
         )
         right, upward, forward = np.asarray(aim._axes(), np.float64)
-        x, y, z = (
-            np.asarray(mesh.vertices, np.float64) @ axis for axis in (right, upward, forward)
-        )
+        seen = np.asarray(mesh.vertices, np.float64)[np.unique(np.asarray(mesh.faces))]
+        if not len(seen) or not np.ptp(seen, axis=0).any():
+            raise ValueError("expected a mesh that is larger than a point, to place a camera")
+        x, y, z = (seen @ axis for axis in (right, upward, forward))
         # Seen from (cx, cy, cz) along z, a vertex is inside where |x - cx| ≤ tan_x (z - cz): the
         # camera is as far forward as the tighter of the two pairs of planes allows.
         tan_y = math.tan(math.radians(fov_y) / 2) * (1 - margin)

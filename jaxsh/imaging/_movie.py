@@ -213,7 +213,9 @@ def _write_mp4(
     height, width, _ = first.shape
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:.6f}"]
     crf = f"{(1 - quality / 100) * 51:.1f}"
-    command = [ffmpeg, "-v", "error", "-y", *source, "-i", "-", "-crf", crf, *_MP4, file.name]
+    command = [ffmpeg, "-v", "error", "-y", *source, "-i", "-", "-crf", crf, *_MP4]
+    # The whole path: ffmpeg takes "-name" for an option, and "name:" for a protocol.
+    command.append(os.path.abspath(file.name))
     # Its words go to a file: a pipe that nobody reads may fill up.
     with tempfile.TemporaryFile() as said:
         process = subprocess.Popen(

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Array, Real
 
-from .._core.checks import as_path, described
+from .._core.checks import as_path, check_known, described
 from ._files import decoded
 
 _DISPLAY, _LINEAR = (".png", ".jpg", ".jpeg"), (".exr", ".hdr")
@@ -73,7 +73,8 @@ def write_image(
 
 
 def as_numbers(image: object) -> np.ndarray:
-    """Convert to an array of numbers; raises `ValueError` for anything else."""
+    """Convert to an array of numbers; raises `ValueError` for what is traced or anything else."""
+    check_known("image", image)
     try:
         array = np.asarray(image)
     except (TypeError, ValueError):  # lists of several lengths

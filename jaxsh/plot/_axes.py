@@ -68,10 +68,10 @@ def _new_panels(shape: tuple[int, ...], size: tuple[float, float]) -> np.ndarray
 
 def color_bar(axes: Axes | Sequence[Axes], scale: ColorScale, label: str) -> None:
     """Draw a bar beside the axes, from which it takes the room."""
-    one = axes if isinstance(axes, Axes) else axes[0]
-    bar = one.figure.colorbar(
+    beside = [axes] if isinstance(axes, Axes) else list(axes)
+    bar = beside[0].figure.colorbar(
         ScalarMappable(scale.norm, scale.cmap),
-        ax=axes if isinstance(axes, Axes) else list(axes),
+        ax=beside if len(beside) > 1 else beside[0],  # tight_layout knows a bar of one alone
         label=label,
         extend=scale.extend,
         fraction=0.046,
@@ -81,10 +81,17 @@ def color_bar(axes: Axes | Sequence[Axes], scale: ColorScale, label: str) -> Non
         plain_logarithm(bar.ax.yaxis)
 
 
+class _Plain(LogFormatter):
+    """Writes as plain numbers what its base would write as powers."""
+
+    def __call__(self, x, pos=None):
+        return f"{x:g}" if super().__call__(x, pos) else ""
+
+
 def plain_logarithm(axis: Axis) -> None:
     """Label a logarithmic axis with plain numbers, between the powers of ten where they are few."""
     axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(2, 0.4)))
+    axis.set_minor_formatter(_Plain(labelOnlyBase=False, minor_thresholds=(2, 0.4)))
 
 
 def length_bar(ax: Axes, per_length: float, said: str, unit: str, *, left: bool = False) -> None:

@@ -72,7 +72,7 @@ def ball(
     check_choice("of", of, ("radiance", "mirror", "diffuse"))
     check_choice("curve", curve, ("clip", "reinhard"))
     white = check_number("white", white, above=0.0, infinite=True)
-    resolution = check_size("resolution", resolution)
+    resolution = check_size("resolution", resolution, 2)
     if exposure is not None:
         exposure = check_number("exposure", exposure, least=0.0)
     viewer = frame(toward)
@@ -121,7 +121,10 @@ def _half_way(place: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
 
 def _diffuse(light, normals: Float[np.ndarray, "n n 3"]) -> Float[np.ndarray, "n n c"]:
     if light.ndim == 3:
-        light = np.asarray(project_lat_long(jnp.asarray(light), _EXACT))
+        degree = min(
+            _EXACT, (min(light.shape[:2]) - 1) // 2
+        )  # of a small picture, as far as it has
+        light = np.asarray(project_lat_long(jnp.asarray(light), degree))
     flat = jnp.asarray(normals.reshape(-1, 3).astype(light.dtype))
     values = np.asarray(irradiance(jnp.asarray(light), flat)) / np.pi
     return values.reshape(*normals.shape[:2], -1).astype(light.dtype)

@@ -99,7 +99,8 @@ def draw_balloon(
             fontsize="small",
             path_effects=[withStroke(linewidth=2, foreground=ax.get_facecolor())],
         )
-    ax.imshow(picture, extent=(-_HALF, _HALF, -_HALF, _HALF), aspect="equal", zorder=1)
+    extent = (-_HALF, _HALF, -_HALF, _HALF)
+    ax.imshow(picture, extent=extent, aspect="equal", origin="upper", zorder=1)
     ax.set(xlim=(-_HALF, _HALF), ylim=(-_HALF, _HALF))
     ax.set_axis_off()
     if largest > 0:

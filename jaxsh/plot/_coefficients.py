@@ -88,6 +88,7 @@ def _draw(ax: Axes, function, degree: int, scale, numbers: bool) -> None:
         table,
         extent=(-degree - 0.5, degree + 0.5, degree + 0.5, -0.5),
         aspect="equal",
+        origin="upper",
         cmap=scale.cmap,
         norm=scale.norm,
         interpolation="nearest",

@@ -44,7 +44,8 @@ def color_scale(
     if log:
         if lowest < 0:
             raise ValueError(f"log needs values that are not negative, got {lowest:g}")
-        low = max(lowest, _DECADES * largest) if low is None else low
+        if low is None:  # a decade at least: the values may be all the same
+            low = max(min(lowest, largest / 10), _DECADES * largest)
         if not 0 < low < largest:
             raise ValueError(f"log needs limits above zero that differ, got ({low:g}, {largest:g})")
         norm: Normalize = LogNorm(low, largest, clip=True)
@@ -63,7 +64,7 @@ def _bounds(limits: Any) -> tuple[float | None, float | None]:
     """Read the lower and the upper bound, where they are said."""
     if limits is None:
         return None, None
-    if isinstance(limits, tuple | list):
+    if isinstance(limits, tuple | list) or (isinstance(limits, np.ndarray) and limits.ndim):
         if len(limits) != 2:
             raise ValueError(f"expected limits as (low, high), got {described(limits)}")
         low, high = (check_number("limits", one) for one in limits)

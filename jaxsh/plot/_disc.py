@@ -63,6 +63,7 @@ def show_disc(ax: Axes, colors: Float[np.ndarray, "n n 3"], covered, extent=(-1,
         np.concatenate([np.clip(colors, 0, 1), covered[..., None]], axis=-1),
         extent=extent,
         aspect="equal",
+        origin="upper",
     )
     left, right, bottom, top = extent
     middle, radius = ((left + right) / 2, (bottom + top) / 2), (right - left) / 2

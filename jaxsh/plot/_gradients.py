@@ -137,5 +137,5 @@ def _draw_arrows(ax: Axes, places, slopes, unit: str) -> None:
     if steepest > 0:
         step = round_down(steepest)
         ax.quiverkey(
-            arrows, 0.65, 1.04, step, f"{step:g} {unit}".strip(), labelpos="E", coordinates="axes"
+            arrows, 0.88, 1.04, step, f"{step:g} {unit}".strip(), labelpos="W", coordinates="axes"
         )

@@ -73,6 +73,7 @@ def light(
         encoded,
         extent=(0, 360, 180, 0),
         aspect="equal",
+        origin="upper",
         interpolation="nearest",
     )
     _mark_negative(ax, picture)

@@ -52,7 +52,7 @@ class Surface(NamedTuple):
         ax = flat_axes(ax, (scale * wide + 0.8, scale * high + 0.5))
         picture = np.concatenate([np.clip(colors, 0, 1), self.alpha[..., None]], axis=-1)
         for layer in (picture,) if over is None else (picture, over):
-            ax.imshow(layer, extent=(0, width, height, 0), aspect="equal")
+            ax.imshow(layer, extent=(0, width, height, 0), aspect="equal", origin="upper")
         ax.set(xlim=box[:2], ylim=box[2:])
         ax.set_axis_off()
         length_bar(ax, self.per_length, "", unit)

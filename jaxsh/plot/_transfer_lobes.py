@@ -85,7 +85,8 @@ def transfer_lobes(
         chosen = _spread(points, _facing(surface), count)
     else:
         chosen = _read(vertices, _seen(surface.raster.face, surface))
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    used = np.unique(np.asarray(mesh.faces))
+    diagonal = float(np.linalg.norm(np.ptp(points[used], axis=0)))
     shapes = balloons(values[chosen], max(_STEPS, 4 * degree_of(values.shape[1])))
     scale = size * diagonal / (float(abs(shapes.values).max()) or 1.0)
     joined = _joined(shapes, points[chosen], scale)

@@ -111,7 +111,7 @@ def vertices(
 
 def _given(values, count: int) -> np.ndarray:
     known = isinstance(values, np.ndarray | jax.Array) and not isinstance(values, Tracer)
-    if known and np.dtype(values.dtype).kind in "bi":
+    if known and np.dtype(values.dtype).kind in "biu":
         array = np.asarray(values)
     else:
         array = read("values", values)

@@ -12,6 +12,7 @@ from string import Template
 from jaxtyping import ArrayLike, Float, Int
 
 from .._core.checks import as_path
+from .._core.files import check_place, put_in_place
 from ..imaging import Camera
 from ..transfer import Material, Transfer
 from ._lamp import Lamp
@@ -88,6 +89,7 @@ def export_html(
     ('knot.html', True)
     """
     path = as_path(path)
+    check_place(path)
     scene = make_scene(
         transfer, light, faces, albedo, camera, exposure, names, title, values, sky, lamp
     )
@@ -100,6 +102,5 @@ def export_html(
         arrays=arrays,
         script=script("page"),
     )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(page, encoding="utf-8")
+    put_in_place({path: page.encode("utf-8")})
     return path

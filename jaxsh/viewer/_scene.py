@@ -14,6 +14,7 @@ from .._core.checks import (
     check_all,
     check_faces,
     check_finite,
+    check_known,
     check_number,
     check_type,
 )
@@ -60,6 +61,9 @@ def make_scene(
 ) -> Scene:
     """Check all and pack it; raises `ValueError` or `TypeError` for what does not fit."""
     check_type("transfer", transfer, Transfer)
+    known = {"transfer": transfer, "albedo": albedo, "values": values, "camera": camera}
+    for name, value in known.items():
+        check_known(name, value)
     lights = make_lights(light, sky, lamp, transfer)
     count = transfer.num_points
     if count > _ROW * _MOST_ROWS:
@@ -73,6 +77,11 @@ def make_scene(
     check_type("title", title, str)
     positions = np.asarray(transfer.positions, np.float32)
     check_finite("positions of the transfer", positions, wait=True)
+    seen = positions[np.unique(corners)]  # what no face has would be beside the picture
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    radius = float(np.linalg.norm(seen - middle, axis=1).max())
+    if radius == 0:
+        raise ValueError(f"expected a mesh, got faces whose corners are all at {middle.tolist()}")
     if camera is None:
         camera = Camera.facing(
             Mesh(jnp.asarray(positions), jnp.asarray(corners), jnp.asarray(positions))
@@ -86,7 +95,6 @@ def make_scene(
         exposure = float(auto_exposure(sent[None]))
     rows = math.ceil(count / _ROW)
     layers = in_layers(rounded.codes, rows)
-    middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
     header = {
         "title": title,
         "names": checked_names(names, lights.names()),
@@ -96,7 +104,7 @@ def make_scene(
         "albedo": shared,
         "camera": _facts(camera),
         "middle": middle.tolist(),
-        "radius": float(np.linalg.norm(positions - middle, axis=1).max()),
+        "radius": radius,
         "scales": rounded.scales.tolist(),
         "numVertices": count,
         "numFaces": len(corners),

@@ -113,6 +113,16 @@ def test_facing_fills_the_picture(width, height, toward):
     )
 
 
+def test_facing_sees_faces_and_no_more():
+    mesh = knot(300)
+    beside = jnp.full((2, 3), 100.0, mesh.vertices.dtype)
+    vertices, normals = (jnp.concatenate([some, beside]) for some in (mesh.vertices, mesh.normals))
+    found = Camera.facing(Mesh(vertices, mesh.faces, normals))
+    np.testing.assert_array_equal(found.position, Camera.facing(mesh).position)
+    with pytest.raises(ValueError, match="a mesh that is larger than a point"):
+        Camera.facing(Mesh(0 * mesh.vertices, mesh.faces, mesh.normals))
+
+
 def test_facing_leaves_a_margin():
     mesh = knot(2000)
     camera = Camera.facing(mesh, width=100, height=100, margin=0.2)

@@ -177,6 +177,13 @@ def test_bad_movies_are_refused(unchecked, tmp_path, name, frames, options, mess
 
 
 @needs_ffmpeg
+def test_ffmpeg_takes_names_as_files(tmp_path, monkeypatch):
+    pytest.importorskip("imageio_ffmpeg")
+    monkeypatch.chdir(tmp_path)
+    for name in ("-y.mp4", "at:10.mp4"):
+        assert write_movie(name, sweep(2)).stat().st_size > 500
+
+
 def test_odd_sizes_are_refused_in_mp4(tmp_path):
     with pytest.raises(ValueError, match="is of even height and width, got 3 × 4"):
         write_movie(tmp_path / "a.mp4", [np.ones((3, 4))])

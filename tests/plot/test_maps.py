@@ -109,6 +109,21 @@ def test_transfer_lobes_stand_at_their_vertices():
         plot.transfer_lobes(KNOT, round_[:4], camera=CAMERA)
 
 
+def test_pictures_stand_upright_whatever_the_style_says():
+    with pyplot.rc_context({"image.origin": "lower"}):
+        light = np.array([1.0, 0, 0.5, 0])
+        kinds = np.arange(300, dtype=np.uint8) % 3
+        axes = [Figure().add_subplot() for _ in range(5)]
+        plot.ball(light, ax=axes[0], resolution=8)
+        plot.coefficients(light, ax=axes[1])
+        plot.dome(light, ax=axes[2], resolution=8)
+        plot.light(light, ax=axes[3], height=8)
+        plot.vertices(KNOT, kinds, label="kind", ax=axes[4], camera=CAMERA)
+        for ax in axes:
+            assert [image.origin for image in ax.get_images()] == ["upper"]
+    axes[1].figure.tight_layout()  # warns where it would lay the color bar over the picture
+
+
 @pytest.mark.slow
 def test_every_picture_can_be_read_on_a_dark_ground():
     """Text stands out from what it is on: it follows the style, or is outlined or in a cell."""

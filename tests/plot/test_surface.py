@@ -147,7 +147,7 @@ def test_shaded_marks_negative_radiance():
         (np.ones((4, 3)), {}, "for radiance see plot.shaded"),
         (np.array([1, np.nan, 0, 0]), {}, "values must be finite, got 1 of 4"),
         (-np.ones(4), {"log": True}, "log needs values that are not negative, got -1"),
-        (np.ones(4), {"log": True}, "log needs limits above zero that differ"),
+        (np.ones(4), {"log": True, "limits": (0, 1)}, "log needs limits above zero that differ"),
         (np.ones(4), {"limits": (1, 1)}, "expected limits with low < high"),
         (np.ones(4), {"limits": (1, 2, 3)}, r"expected limits as \(low, high\)"),
         (np.ones(4), {"limits": -1.0}, "limits must be a number > 0"),
@@ -166,6 +166,16 @@ def test_shaded_marks_negative_radiance():
 def test_vertices_refuse(values, options, message, unchecked):
     with pytest.raises(ValueError, match=message):
         plot.vertices(SQUARE, values, label="it", **{"camera": CAMERA} | options)
+
+
+def test_logarithms_of_one_number_have_a_decade():
+    ax = plot.vertices(SQUARE, np.full(4, 0.5), label="it", log=True, camera=CAMERA)
+    bar = ax.figure.axes[1]
+    assert bar.get_ylim() == pytest.approx((0.05, 0.5))
+    ax.figure.canvas.draw()
+    said = [text.get_text() for text in bar.get_yticklabels(minor=True) if text.get_text()]
+    assert said
+    assert not any("e" in text for text in said)
 
 
 def test_shaded_refuses(unchecked):

@@ -9,7 +9,7 @@ const { folder, header, skyTable, skies, suns, lamp, terms, points, field, cut }
 );
 const load = (name) => import(pathToFileURL(`${folder}/${name}.js`));
 const { basisWithGradient } = await load("harmonics");
-const { skyLight, sunAt, keptUp } = await load("sky");
+const { minutesOf, skyLight, sunAt, keptUp } = await load("sky");
 const { ballTerms, gridPoints, interpolated, keptNear, lampTerms } = await load("near");
 const { factorsOf } = await load("factors");
 
@@ -34,6 +34,13 @@ test("the sun stands where sky.sun_direction says", () => {
   }
   near(keptUp([3, 4, -1]), [0.6, 0.8, 0], 1e-15);
   near(keptUp([0, 0, -1]), [1, 0, 0], 0);
+});
+
+test("minutes of a day count from midnight, before 1970 too", () => {
+  for (const text of ["2026-06-21T10:30:59Z", "1950-06-21T10:30:00Z", "1950-06-21T00:00:00Z"]) {
+    const [hours, minutes] = text.slice(11, 16).split(":").map(Number);
+    assert.equal(minutesOf(Date.parse(text)), 60 * hours + minutes);
+  }
 });
 
 test("the basis' gradient is that of finite differences", () => {

@@ -111,7 +111,7 @@ def test_lights_in_javascript_agree_with_python(rng, tmp_path):
         text=True,
     )
     assert run.returncode == 0, run.stdout + run.stderr
-    assert "pass 7" in run.stdout
+    assert "pass 8" in run.stdout
 
 
 def test_what_does_not_fit_is_refused(unchecked):

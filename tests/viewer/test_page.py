@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -194,6 +195,46 @@ def test_what_does_not_fit_is_refused(tmp_path, unchecked):
         with pytest.raises(ValueError, match=message):
             viewer.export_html(path, **given)
     assert not path.exists()
+
+
+def test_vertices_beside_the_mesh_do_not_count(tmp_path):
+    mesh, made, light, _ = pages.example()
+    shown = np.asarray(mesh.faces)[:40]
+    page = viewer.export_html(tmp_path / "some.html", made, light[:, :4], shown)
+    positions = np.asarray(mesh.vertices)[np.unique(shown)]
+    header = pages.parts(page)[0]
+    middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
+    np.testing.assert_allclose(header["middle"], middle, rtol=0, atol=1e-6)
+    far = np.linalg.norm(positions - middle, axis=1).max()
+    assert header["radius"] == pytest.approx(far, rel=1e-6)
+
+
+def test_traced_arrays_are_refused(tmp_path):
+    mesh, made, light, _ = pages.example()
+
+    def drawn(whose, value):
+        given = {"transfer": made, "light": light, "faces": mesh.faces} | {whose: value}
+        return viewer.export_html(tmp_path / "no.html", **given)
+
+    for whose, value in (
+        ("transfer", made),
+        ("light", light),
+        ("albedo", np.ones(3)),
+        ("values", {"a": np.ones(300)}),
+    ):
+        with pytest.raises(ValueError, match=f"expected known values for {whose}"):
+            jax.jit(drawn, static_argnums=0)(whose, value)
+
+
+def test_a_page_is_whole_or_not_there(tmp_path):
+    mesh, made, light, _ = pages.example()
+    path = tmp_path / "old.html"
+    path.write_text("old")
+    with pytest.raises(UnicodeEncodeError):
+        viewer.export_html(path, made, light, mesh.faces, title="\ud800")
+    assert path.read_text() == "old"
+    with pytest.raises(IsADirectoryError, match=r"cannot be written: it is a folder"):
+        viewer.export_html(tmp_path, made, light, mesh.faces)
 
 
 def test_the_documentations_example_is_of_this_viewer():

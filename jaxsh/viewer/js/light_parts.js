@@ -5,7 +5,7 @@ import { LampHandle } from "./handle.js";
 import { interpolated, keptNear, lampTerms } from "./near.js";
 import { NearShading } from "./near_shading.js";
 import { number, row } from "./python_text.js";
-import { bearingOf, heightOf, keptUp, skyLight, sunAt, sunFrom } from "./sky.js";
+import { bearingOf, heightOf, keptUp, minutesOf, skyLight, sunAt, sunFrom } from "./sky.js";
 import { SunHandle } from "./sun_handle.js";
 import { apply, minus, plus } from "./vectors.js";
 
@@ -31,8 +31,13 @@ export const windowPart = {
     const chosen = menu("Window against ringing", names, (i) => viewer.set({ window: kinds[i] }));
     return [{ ...chosen, show: (state) => chosen.set(kinds.indexOf(state.window)) }];
   },
-  python: ({ window, degree }) =>
-    window === "none" ? [] : [`# light = light * harmonics.window("${window}", ${degree})`],
+  // The light of a sky stands above; another is the user's.
+  python: (state, scene) => {
+    const { window, degree } = state;
+    if (window === "none") return [];
+    const line = `light = light * harmonics.window("${window}", ${degree})`;
+    return [kindOf(scene, state) === "sky" ? line : `# ${line}`];
+  },
 };
 
 // Coefficients of the sky in place of those that were sent, which are those of its first sun.
@@ -56,7 +61,10 @@ export const skyPart = {
   python: (state, scene) => {
     if (kindOf(scene, state) !== "sky") return [];
     const { sun, turbidity, disc, degree, intensity } = state;
-    if (sun[2] < 0) return ["# The sun is below the horizon: no light."];
+    if (sun[2] < 0) {
+      const count = (degree + 1) ** 2;
+      return ["# The sun is below the horizon: no light.", `light = jnp.zeros((3, ${count}))`];
+    }
     const own = Math.min(degree, scene.sky.degree);
     const lines = [
       `sun, turbidity, gain = jnp.array([${row(sun)}]), ${number(turbidity)}, `
@@ -146,13 +154,12 @@ function skyControls(viewer) {
 
 // Date, time and place: the sun stands where they say once one of them is changed.
 function placeControls(placed) {
-  const minutes = (time) => Math.floor(time / 60000) % 1440;
   const two = (x) => String(x).padStart(2, "0");
   let now = 0; // the time that the state has
   const clock = slider("Time (UTC)", {
     min: 0, max: 1439, step: 1, value: 0,
     said: (x) => `${two(Math.floor(x / 60))}:${two(x % 60)}`,
-    changed: (x) => placed({ time: now - minutes(now) * 60000 + x * 60000 }),
+    changed: (x) => placed({ time: now + (x - minutesOf(now)) * 60000 }),
   });
   const field = (label, properties, changed) => {
     const input = Object.assign(document.createElement("input"), properties);
@@ -162,7 +169,7 @@ function placeControls(placed) {
     return { element, input };
   };
   const date = field("Date", { type: "date", min: "1900-01-01", max: "2100-12-31" }, (input) =>
-    placed({ time: input.valueAsNumber + minutes(now) * 60000 }));
+    placed({ time: input.valueAsNumber + minutesOf(now) * 60000 }));
   const latitude = field("Latitude", { type: "number", min: -90, max: 90, step: "any" }, (input) =>
     placed({ latitude: input.valueAsNumber }));
   const longitude = field("Longitude", { type: "number", min: -360, max: 360, step: "any" }, (input) =>
@@ -173,7 +180,7 @@ function placeControls(placed) {
       now = time;
       date.input.value = new Date(time).toISOString().slice(0, 10);
     } },
-    { element: clock.element, show: ({ time }) => clock.set(minutes(time)) },
+    { element: clock.element, show: ({ time }) => clock.set(minutesOf(time)) },
     { element: latitude.element, show: (state) => (latitude.input.value = state.latitude) },
     { element: longitude.element, show: (state) => (longitude.input.value = state.longitude) },
     { element: night.element, show: ({ sun }) => {

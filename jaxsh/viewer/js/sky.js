@@ -123,6 +123,9 @@ export function sunAt(time, latitude, longitude) {
   ];
 }
 
+// Minutes since midnight, UTC; before 1970 times are negative.
+export const minutesOf = (time) => (((Math.floor(time / 60000) % 1440) + 1440) % 1440);
+
 const RADIANS = Math.PI / 180;
 
 // Degrees of a sun above the horizon.

@@ -14,6 +14,13 @@ import { Renderer } from "./renderer.js";
 import { saveImage } from "./save.js";
 import { UNTURNED, View } from "./view.js";
 
+// The number of a code of 16 bits between two others, without the digits that the codes do not tell.
+export function decoded(code, low, high) {
+  const digits = Math.floor(-Math.log10((high - low) / 65535 || 1));
+  const value = low + (code / 65535) * (high - low);
+  return digits >= 0 && digits <= 100 ? Number(value.toFixed(digits)) : value;
+}
+
 export class Viewer {
   // Builds picture and panel in `root`. `scene` is what `unpacked` gives.
   constructor(root, scene) {
@@ -150,7 +157,7 @@ export class Viewer {
   // One of the scene's values at a vertex, in words.
   valueOf({ array, labels, low, high }, vertex) {
     const code = this.scene[array][vertex];
-    return labels ? labels[code] : shortNumber(low + (code / 65535) * (high - low));
+    return labels ? labels[code] : shortNumber(decoded(code, low, high));
   }
 
   // Linear radiance of one vertex as it was last shaded.

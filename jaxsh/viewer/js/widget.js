@@ -10,7 +10,15 @@ function render({ model, el }) {
   root.style.height = `${model.get("height")}px`;
   root.textContent = "Waiting for the mesh …";
   const lights = () => viewer?.setLights(model.get("lights"));
-  const moved = () => viewer?.set(model.get("moved"));
+  // What Python has moved since the last time: what was dragged here since then stays.
+  let known = {};
+  const moved = () => {
+    if (!viewer) return;
+    const all = model.get("moved");
+    const fresh = Object.entries(all).filter(([name, x]) => String(x) !== String(known[name]));
+    known = all;
+    viewer.set(Object.fromEntries(fresh));
+  };
   const received = (message, buffers) => {
     if (message.kind !== "scene" || viewer) return;
     const view = buffers[0];
