@@ -6,7 +6,7 @@ import jax
 import matplotlib
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import ArrayLike, Bool, Float, Int
+from jaxtyping import ArrayLike, Bool, Float, Integer
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap, to_rgb
@@ -26,7 +26,7 @@ _MOST = 24  # kinds that colors still tell apart
 
 def vertices(
     mesh: Mesh,
-    values: Float[ArrayLike, " v"] | Int[ArrayLike, " v"] | Bool[ArrayLike, " v"],
+    values: Float[ArrayLike, " v"] | Integer[ArrayLike, " v"] | Bool[ArrayLike, " v"],
     *,
     label: str,
     camera: Camera | None = None,

@@ -231,6 +231,10 @@ def test_the_widget_draws_and_follows_its_light(browser, file):
     page.evaluate("(lights) => model.set('lights', lights)", (0.5 * light[None]).tolist())
     assert abs(levels(colors(page)) - levels(0.5 * shaded)).max() < 0.1
     assert page.locator("canvas").first.bounding_box()["height"] == 300
+    # What Python did not move anew stays as it is on the page.
+    page.evaluate("model.set('moved', { exposure: 2 }); viewer.set({ exposure: 3 })")
+    page.evaluate("model.set('moved', { exposure: 2, degree: 4 })")
+    assert page.evaluate("[viewer.state.exposure, viewer.state.degree]") == [3, 4]
     page.evaluate("clean()")
     assert page.evaluate("Object.keys(listeners)") == []
     page.context.close()

@@ -77,10 +77,14 @@ def test_the_sky_is_pythons_wherever_the_sun_is(page):
         page.evaluate("(facts) => viewer.set(facts)", facts)
         clear = sky.preetham_harmonics(np.array(sun), turbidity, DEGREE)  # the precise table
         whole = clear + sky.sun_harmonics(np.array(sun), turbidity, DEGREE)
-        said = {"imaging": imaging, "sky": sky, "jnp": jnp}
+        softened = 0.05 * whole * harmonics.window(window, DEGREE)[None]
+        said = {"imaging": imaging, "sky": sky, "jnp": jnp, "harmonics": harmonics}
         exec(page.evaluate("viewer.python()"), said)
-        np.testing.assert_allclose(said["light"], 0.05 * whole, rtol=0, atol=1e-4)
-        assert apart(page, shaded(0.05 * whole * harmonics.window(window, DEGREE)[None])) < 0.1
+        np.testing.assert_allclose(said["light"], softened, rtol=0, atol=1e-4)
+        assert apart(page, shaded(softened)) < 0.1
+    page.evaluate("viewer.set({ sun: [0.6, 0, -0.8] })")  # night
+    exec(page.evaluate("viewer.python()"), said)
+    assert not said["light"].any()
 
 
 def test_the_sun_is_dragged_and_set_by_date_and_place(page):
