@@ -35,7 +35,7 @@ export const windowPart = {
   python: (state, scene) => {
     const { window, degree } = state;
     if (window === "none") return [];
-    const line = `light = light * harmonics.window("${window}", ${degree})`;
+    const line = `light = light * harmonics.window("${window}", ${degree})[None]`;
     return [kindOf(scene, state) === "sky" ? line : `# ${line}`];
   },
 };
