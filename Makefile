@@ -32,6 +32,7 @@ define environment
 endef
 
 $(VENV)/installed: pyproject.toml
+	@echo "Installing into $(VENV), once: 1.8 GB, some minutes"
 	$(call environment,$(VENV))
 	$(bin)/python -m pip install --quiet --editable . --group check
 	touch $@
