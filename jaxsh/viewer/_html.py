@@ -85,7 +85,7 @@ def export_html(
     >>> light = sphere.project_lat_long(imaging.studio(16, 32), degree=2)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     page = viewer.export_html(pathlib.Path(folder) / "knot.html", made, light, mesh.faces)
-    ...     page.name, page.stat().st_size < 100_000
+    ...     page.name, page.stat().st_size < 200_000
     ('knot.html', True)
     """
     path = as_path(path)
