@@ -44,8 +44,10 @@ def color_scale(
     if log:
         if lowest < 0:
             raise ValueError(f"log needs values that are not negative, got {lowest:g}")
-        if low is None:  # a decade at least: the values may be all the same
-            low = max(min(lowest, largest / 10), _DECADES * largest)
+        if low is None:
+            low = max(lowest, _DECADES * largest)
+            if lowest == highest == largest:  # all the same: a decade below it
+                low = largest / 10
         if not 0 < low < largest:
             raise ValueError(f"log needs limits above zero that differ, got ({low:g}, {largest:g})")
         norm: Normalize = LogNorm(low, largest, clip=True)
