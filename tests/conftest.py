@@ -63,3 +63,18 @@ def pytest_generate_tests(metafunc):
 def kind_of_mesh(request, monkeypatch):
     """The one kind of mesh that `check_sharded` tries in this test."""
     monkeypatch.setattr(sharding, "kinds", (request.param,))
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """One Chromium for all tests that drive one, drawing in software."""
+    import viewer_pages  # imports jaxsh, so not above
+
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+    options = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    with playwright.sync_playwright() as started:
+        launched = started.chromium.launch(
+            executable_path=viewer_pages.chromium(), args=[*options, "--no-sandbox"]
+        )
+        yield launched
+        launched.close()

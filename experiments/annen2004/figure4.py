@@ -12,7 +12,7 @@ from jaxsh import geometry, imaging, midrange, transfer
 
 from ..runner import Column, Context, Table, experiment
 from ..shared.lights import exact_light, rectangle
-from ..shared.plots import GROUND, Panel, View, draw_panels
+from ..shared.plots import GROUND, Panel, View, camera_on, draw_panels
 from ..shared.subjects import Subject, load
 from .scenes import psnr
 
@@ -122,10 +122,8 @@ def _place(
 def _camera(config: Figure4, light: midrange.Polygon, places: list[Place]) -> imaging.Camera:
     """One for all panels, that sees the light and the head wherever it goes."""
     seen = jnp.concatenate([light.vertices, places[0].mesh.vertices, places[-1].mesh.vertices])
-    faces = jnp.arange(3, dtype=jnp.int32)[None]
-    everything = geometry.Mesh(seen, faces, jnp.zeros_like(seen))
-    return imaging.Camera.facing(
-        everything,
+    return camera_on(
+        seen,
         toward=_TOWARD,
         width=round(_WIDTH * config.size),
         height=config.size,

@@ -12,7 +12,7 @@ from matplotlib.patches import Polygon
 
 from jaxsh import geometry, imaging, inverse, midrange, plot, transfer
 
-from ..shared.plots import View, plt, save
+from ..shared.plots import View, camera_on, plt, save
 from .lights import shade, with_noise
 
 if TYPE_CHECKING:
@@ -91,9 +91,8 @@ def _draw_aside(
         "recovered": ([light.vertices for light in scene.found], _FOUND, "--", 2.0),
     }
     corners = [np.asarray(each) for light, *_ in outlines.values() for each in light]
-    points = jnp.asarray(np.concatenate([np.asarray(mesh.vertices), *corners]))
-    everything = geometry.Mesh(points, mesh.faces, jnp.zeros_like(points))
-    camera = imaging.Camera.facing(everything, toward=toward, width=size, height=size, margin=0.1)
+    points = np.concatenate([np.asarray(mesh.vertices), *corners])
+    camera = camera_on(points, toward=toward, width=size, height=size, margin=0.1)
     plot.shaded(
         mesh, jnp.maximum(color, 0), camera=camera, exposure=exposure, length=_UNIT, ax=axis
     )

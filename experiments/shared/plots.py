@@ -49,6 +49,13 @@ Behind = float | Float[Array, "h w 3"]
 Color = tuple[float, float, float]
 
 
+def camera_on(points: Float[ArrayLike, "n 3"], **options: Any) -> imaging.Camera:
+    """Place a camera that sees all points; `options` are those of `imaging.Camera.facing`."""
+    points = jnp.asarray(points)
+    each = jnp.repeat(jnp.arange(len(points), dtype=jnp.int32)[:, None], 3, axis=1)
+    return imaging.Camera.facing(geometry.Mesh(points, each, jnp.zeros_like(points)), **options)
+
+
 class Bar(NamedTuple):
     """What the colors of a panel mean, told below it: a range of numbers, or names."""
 

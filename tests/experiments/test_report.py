@@ -2,12 +2,11 @@
 
 import html
 import html.parser
-import os
 import re
-import shutil
 
 import jax
 import pytest
+from viewer_pages import chromium
 
 from experiments.runner import Column, Table, UserError
 from experiments.runner.claims import Claim, judge, read
@@ -17,7 +16,6 @@ from experiments.runner.report import to_markdown
 from experiments.runner.results import Shown, _tables, in_view
 from experiments.runner.sources import digests
 
-CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium")
 PAPER = """\
 title = "On Toys"
 cited = "Nobody 1900"
@@ -379,9 +377,8 @@ def test_numbers_tell_rows_apart_where_texts_do_not():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium, which is not here")
-def test_in_a_browser_the_page_fits_and_shows_the_rest_on_demand(toy_paper):
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+@pytest.mark.skipif(chromium() is None, reason="needs Chromium, which is not here")
+def test_in_a_browser_the_page_fits_and_shows_the_rest_on_demand(toy_paper, browser):
     toy_paper.run("toy")
     table = toy_paper.out / "toy" / "quick" / "table.md"
     columns = [Column("name", "name"), *(Column(f"x{i}", f"a long heading {i}") for i in range(9))]
@@ -389,21 +386,19 @@ def test_in_a_browser_the_page_fits_and_shows_the_rest_on_demand(toy_paper):
     table.write_text(f"# toy\n\n{to_markdown(Table('Wide', columns, note='A note.'), rows)}")
     report(toy_paper)
     asked = []
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        for width in (1280, 390):
-            page = browser.new_page(viewport={"width": width, "height": 800})
-            page.on("request", lambda one: asked.append(one.url))
-            page.goto((toy_paper.out / "report.html").as_uri())
-            assert page.evaluate("document.documentElement.scrollWidth") == width
-            wide = page.locator(".part table")
-            assert wide.locator("thead th:visible").count() == 6
-            assert wide.locator("tbody tr:visible").count() == 12
-            page.get_by_text("all 10 columns, all 20 rows").click()
-            assert wide.locator("thead th:visible").count() == 10
-            assert wide.locator("tbody tr:visible").count() == 20
-            assert page.evaluate("document.documentElement.scrollWidth") == width
-            assert not page.get_by_text("A note.").is_visible()
-        browser.close()
+    for width in (1280, 390):
+        page = browser.new_page(viewport={"width": width, "height": 800})
+        page.on("request", lambda one: asked.append(one.url))
+        page.goto((toy_paper.out / "report.html").as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+        wide = page.locator(".part table")
+        assert wide.locator("thead th:visible").count() == 6
+        assert wide.locator("tbody tr:visible").count() == 12
+        page.get_by_text("all 10 columns, all 20 rows").click()
+        assert wide.locator("thead th:visible").count() == 10
+        assert wide.locator("tbody tr:visible").count() == 20
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+        assert not page.get_by_text("A note.").is_visible()
+        page.close()
     assert {url.partition(":")[0] for url in asked} <= {"file", "data"}
     assert len([url for url in asked if url.startswith("file:")]) == 2
