@@ -74,7 +74,8 @@ def browser():
     options = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with playwright.sync_playwright() as started:
         launched = started.chromium.launch(
-            executable_path=viewer_pages.chromium(), args=[*options, "--no-sandbox"]
+            executable_path=viewer_pages.chromium(),
+            args=[*options, "--no-sandbox", "--disable-dev-shm-usage"],
         )
         yield launched
         launched.close()

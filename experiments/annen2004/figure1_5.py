@@ -1,4 +1,4 @@
-"""Figures 1 and 5: a mesh under three coloured area lights, by one sample and by its gradient."""
+"""Figures 1 and 5: a mesh under three colored area lights, by one sample and by its gradient."""
 
 import dataclasses
 import functools

@@ -95,7 +95,7 @@ def figure6(config: Figure6, context: Context) -> Table:
 
 
 def _relative(light: Float[Array, "*v 3 k"], exact: Float[Array, "*v 3 k"]) -> Float[Array, "*v"]:
-    """The L2 error over the sphere and all colours, by Parseval, relative to the light."""
+    """The L2 error over the sphere and all colors, by Parseval, relative to the light."""
     return jnp.linalg.norm(light - exact, axis=(-2, -1)) / jnp.linalg.norm(exact, axis=(-2, -1))
 
 
@@ -162,7 +162,7 @@ def _table(config: Figure6, name: str) -> Table:
     columns = [
         Column("quantile", "vertex, by error of the gradient", digits=2),
         Column("moved", "from the sample", digits=2),
-        Column("nearest", "from the nearest light's centre", digits=2),
+        Column("nearest", "from the nearest light's center", digits=2),
         *(Column(order, f"{order}, %", digits=1) for order in _ORDERS),
         Column("its own cube", "its own cube, projected, %", digits=1),
     ]

@@ -97,7 +97,7 @@ def orders(config: Orders, context: Context) -> list[Table]:
         context.record(row | fronts)
     exact = _per_vertex(config, context, subject, lights)
     caption = (
-        "time for capture, projection and shading against PSNR, by order (colour) and samples "
+        "time for capture, projection and shading against PSNR, by order (color) and samples "
         "(number); filled: nothing else is both faster and better. Left, the method's own error; "
         "right, with cubes as captured"
     )

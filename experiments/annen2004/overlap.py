@@ -13,8 +13,8 @@ from ..shared.lights import exact_light, rectangle
 # The blue light has no red in it: in the red channel it is a blocker and nothing else. Their green
 # makes both together near white, where red and blue alone would be purple everywhere.
 _RED, _BLUE = (1.0, 0.4, 0.08), (0.0, 0.5, 1.0)
-_FAR = np.array([-1.6, -2.7, 2.5])  # the red light's centre
-_TOP = np.array([0.0, 0.0, 0.9])  # from up here the blue light's centre hides the red one's
+_FAR = np.array([-1.6, -2.7, 2.5])  # the red light's center
+_TOP = np.array([0.0, 0.0, 0.9])  # from up here the blue light's center hides the red one's
 _BETWEEN = 0.55
 _FILL = 2048
 

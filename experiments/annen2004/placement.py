@@ -253,7 +253,7 @@ def _verdict(config: Placement, frames: list[dict[str, Any]]) -> str:
     mean = sum(row["samples"] for row in frames) / len(frames)
     eight = sum(row["eight"] <= target for row in frames)
     return (
-        f"A light passes {config.gap:g} from the object's centre; error is the relative RMS error "
+        f"A light passes {config.gap:g} from the object's center; error is the relative RMS error "
         "of the irradiance over vertices and normals, predicted by update_samples from 128 of the "
         f"vertices. Target {target:g} %, release {target / 2:g} %: at all vertices it is kept in "
         f"{kept} of {len(frames)} frames, {worst:.1f} % at worst, with {mean:.1f} samples on "

@@ -23,7 +23,7 @@ _TOWARDS = (-0.85, -0.55, 0.2), (0.8, -0.45, 0.35), (0.15, 0.35, 0.95)
 def three_lights(
     distance: float, size: float, *, center: Vector = (0.0, 0.0, 0.0)
 ) -> tuple[midrange.Polygon, ...]:
-    """Squares in red, green and blue around a centre, which they face; none hides another."""
+    """Squares in red, green and blue around a center, which they face; none hides another."""
     center = np.asarray(center, np.float64)
     lights = []
     for towards, color in zip(_TOWARDS, (RED, GREEN, BLUE), strict=True):

@@ -13,7 +13,7 @@ _MARKERS = "osv^D*"
 
 
 def draw(path: Path, rows: list[dict[str, Any]], claim: dict[int, float]) -> None:
-    """E_mean and E_max by bands, a line for each model and a colour for each family."""
+    """E_mean and E_max by bands, a line for each model and a color for each family."""
     figure, axes = plt.subplots(1, 2, figsize=(12, 5.6), sharey=True, layout="constrained")
     styles = _styles(rows)
     for axis, key, name in zip(axes, ("mean", "max"), ("E_mean", "E_max"), strict=True):

@@ -14,7 +14,7 @@ from jaxsh import imaging, sky, sphere
 from ..shared.plots import plt
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec. 709
-_NEGATIVE = (0.3, 0.5, 1.0)  # light below zero has no colour of its own
+_NEGATIVE = (0.3, 0.5, 1.0)  # light below zero has no color of its own
 
 
 def sun_at(zenith: float) -> Float[np.ndarray, " 3"]:

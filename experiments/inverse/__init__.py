@@ -1,1 +1,1 @@
-"""Light recovered from shading: sun and turbidity, near area lights, their colours."""
+"""Light recovered from shading: sun and turbidity, near area lights, their colors."""

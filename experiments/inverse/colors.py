@@ -1,4 +1,4 @@
-"""Colours of lights whose shapes are known, one of which is off."""
+"""Colors of lights whose shapes are known, one of which is off."""
 
 import dataclasses
 from typing import Any, NamedTuple
@@ -40,7 +40,7 @@ class Colors:
     directions: int = 256
     """directions of the bake"""
     distance: float = 1.8
-    """of the lights from the mesh's centre, in its radii"""
+    """of the lights from the mesh's center, in its radii"""
     size: float = 0.7
     """of their sides"""
     albedo: float = 0.7
@@ -53,7 +53,7 @@ class Colors:
 
 
 class Problem(NamedTuple):
-    """Radiance at the vertices is `matrix` @ colours."""
+    """Radiance at the vertices is `matrix` @ colors."""
 
     seen: transfer.Transfer
     lights: list[midrange.Polygon]
@@ -94,7 +94,7 @@ def _problem(config: Colors, seen: transfer.Transfer) -> Problem:
 def _answers(
     problem: Problem, observed: Float[Array, "v 3"], albedo: float
 ) -> dict[str, tuple[Float[np.ndarray, "n 3"], float]]:
-    """Colours by each method, and its seconds; the first call of ours compiles."""
+    """Colors by each method, and its seconds; the first call of ours compiles."""
     matrix, numbers = problem.matrix, np.asarray(observed)
 
     def bounded():
@@ -147,7 +147,7 @@ def _table(config: Colors, context: Context, name: str, total: int, problem: Pro
             )
 
     return Table(
-        "Colours of known lights",
+        "Colors of known lights",
         rows=rows,
         values={
             "name": name,

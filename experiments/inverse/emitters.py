@@ -1,4 +1,4 @@
-"""Place, size and colour of area lights, from the shaded vertices of a mesh and rough guesses."""
+"""Place, size and color of area lights, from the shaded vertices of a mesh and rough guesses."""
 
 import dataclasses
 import itertools
@@ -56,7 +56,7 @@ class Emitters:
 
 
 class Errors(NamedTuple):
-    """Of one light: of its centre, in radii of the mesh; of sizes and radiances, relative."""
+    """Of one light: of its center, in radii of the mesh; of sizes and radiances, relative."""
 
     center: float
     size: float
@@ -130,7 +130,7 @@ def _starts(
     config: Emitters,
     guesses: Sequence[Lights],
 ) -> list[list[midrange.Polygon]]:
-    """The guesses that explain most with the colours that suit each best, in these colours."""
+    """The guesses that explain most with the colors that suit each best, in these colors."""
     rated = []
     for guess in guesses:
         shapes = [light.polygon for light in guess]

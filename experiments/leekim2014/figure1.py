@@ -29,7 +29,7 @@ class Figure1(Look):
 
 
 class Shading(NamedTuple):
-    """Colours by one method."""
+    """Colors by one method."""
 
     method: str
     color: Float[Array, "v 3"]

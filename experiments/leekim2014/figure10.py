@@ -152,7 +152,7 @@ def _column(
     assert now.reached is not None
     yield canvas.levels("specular: degree used", now.reached, BASE, scene.row.degree)
     for name, frames in shown.items():
-        # As a difference of two colours: the errors' own.
+        # As a difference of two colors: the errors' own.
         title = f"{'filter' if name == _FILTER else name}: error's change"
         yield canvas.error(title, frames[i].error, frames[i - 1].error, config.gain)
 

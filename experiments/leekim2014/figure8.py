@@ -31,7 +31,7 @@ class Figure8(Look):
 
 
 class Level(NamedTuple):
-    """Diffuse colours to one degree, and what they have gained over the base."""
+    """Diffuse colors to one degree, and what they have gained over the base."""
 
     degree: int
     color: Float[Array, "v 3"]
@@ -54,7 +54,7 @@ def figure8(config: Figure8, context: Context) -> list[Table]:
         caption = (
             f"{row.mesh} under {row.environment}: diffuse light to each degree; its accumulated "
             f"change since degree {_BASE}, from blue, -{limit:.2g}, to red, +{limit:.2g}, in "
-            f"exposed linear colour; bright, who is still inside at threshold "
+            f"exposed linear color; bright, who is still inside at threshold "
             f"{config.diffuse_threshold:g}"
         )
         _draw(config, context.path(name, caption), scene, levels, limit)

@@ -1,4 +1,4 @@
-"""Pictures of the experiments on Lee & Kim 2014: a scene, regions in false colour, signed maps."""
+"""Pictures of the experiments on Lee & Kim 2014: a scene, regions in false color, signed maps."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ class Look:
     rows: tuple[tuple[str, str, int], ...] = ()
     """probe, mesh and degree; none means the first that the data have, at a low degree"""
     threshold: float = 0.02
-    """of the specular change, in exposed linear colour; the paper's"""
+    """of the specular change, in exposed linear color; the paper's"""
     diffuse_threshold: float = 0.01
     """of the diffuse change; the paper's"""
     directions: int = 2048
@@ -62,7 +62,7 @@ class Canvas(NamedTuple):
         return image[:, self.columns]
 
     def shown(self, color: Float[Array, "v 3"]) -> Float[np.ndarray, "h w 3"]:
-        """Linear colours; white is 1."""
+        """Linear colors; white is 1."""
         return self._cut(self.view.shown(color))
 
     def error(

@@ -1,7 +1,7 @@
 """What the experiments on Lee & Kim 2014 share: the scenes of its table 1, and its errors.
 
-A scene is a mesh under a light probe at a degree. Its light is scaled so that colours come exposed:
-thresholds and errors are of linear colour with white at 1.
+A scene is a mesh under a light probe at a degree. Its light is scaled so that colors come exposed:
+thresholds and errors are of linear color with white at 1.
 """
 
 import dataclasses
@@ -73,7 +73,7 @@ PAPER = {
 
 
 class Quality(NamedTuple):
-    """PSNR in dB of linear colour, clipped to [0, 1]."""
+    """PSNR in dB of linear color, clipped to [0, 1]."""
 
     image: float  # over all pixels; the background is black
     object: float  # over those on the object
@@ -121,7 +121,7 @@ class Scene(NamedTuple):
         return jnp.clip(imaging.interpolate(self.raster, color), 0, 1)
 
     def quality(self, color: Float[Array, "v 3"], reference: Float[Array, "v 3"]) -> Quality:
-        """How far colours are from others."""
+        """How far colors are from others."""
         ours, theirs = self.picture(color), self.picture(reference)
         measured = (
             imaging.psnr(ours, theirs),

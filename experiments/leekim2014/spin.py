@@ -54,7 +54,7 @@ def spun(scene: Scene, angle: float) -> Scene:
 def methods(
     scene: Scene, *, thresholds: dict[str, Any], hysteresis: float, views: int
 ) -> Iterator[Method]:
-    """All but masks, which give the colours of levels."""
+    """All but masks, which give the colors of levels."""
     staged = adaptive.stage(scene.baked)
     # Exact diffuse parts, so that the glossy part alone is in error.
     anchors = make_anchors(scene.baked, diffuse=scene.baked)

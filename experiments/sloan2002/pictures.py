@@ -87,7 +87,7 @@ def _draw_cells(path: Path, cells: list[list[np.ndarray]], titles: list[str]) ->
 
 
 def draw_errors(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Error by degree: a panel for each mesh, a colour for each environment."""
+    """Error by degree: a panel for each mesh, a color for each environment."""
     meshes = list(dict.fromkeys(row["mesh"] for row in rows))
     environments = list(dict.fromkeys(row["environment"] for row in rows))
     figure, axes = plt.subplots(

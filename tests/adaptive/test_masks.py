@@ -42,7 +42,7 @@ METHODS = pytest.mark.parametrize("method", [Masks, Levels])
 
 
 def twin(light, made, eye, material, *, base, thresholds, fallback, exposure, rings):
-    """Colour, degrees reached and shares kept, from the appendix."""
+    """Color, degrees reached and shares kept, from the appendix."""
     light, transfer = np.asarray(light, np.float64), np.asarray(made.coefficients, np.float64)
     matrix = np.asarray(harmonics.product_matrix(light))
     towards = eye - np.asarray(made.positions)
