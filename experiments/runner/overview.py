@@ -4,6 +4,7 @@ import dataclasses
 import datetime
 import sys
 import time
+import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -137,8 +138,6 @@ def run_due(
             print(f"error: {error}", file=sys.stderr)
             failed.append(entry.name)
         except Exception:
-            import traceback
-
             traceback.print_exc()
             failed.append(entry.name)
     if failed:

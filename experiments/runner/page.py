@@ -11,7 +11,7 @@ from pathlib import Path
 from .claims import Verdict
 from .overview import ABOUT, Chapter
 from .registry import Entry
-from .results import Run, Shown, commands, in_view, is_number
+from .results import Run, Shown, command_of, in_view, is_number
 
 _ROWS = 12  # in view; the others on demand
 _HEAVIEST, _WIDEST = 200_000, 1600  # bytes of a picture that is taken as it is; else its pixels
@@ -114,7 +114,7 @@ def _head(entry: Entry, run: Run) -> Iterator[str]:
         f'<p class="facts"><code>{_text(entry.name)}</code> · {_text(entry.reproduces)} · '
         f"preset {_text(run.preset)} · {run.date} · {_text(run.machine)}{stale}</p>"
     )
-    yield f'<pre class="command">{_text(commands(run.environment))}</pre>'
+    yield f'<pre class="command">{_text(command_of(run.environment))}</pre>'
     yield f"<details><summary>conditions</summary><p>{_text(' · '.join(run.about))}</p>"
     yield "</details></header>"
 

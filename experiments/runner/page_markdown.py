@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from .overview import ABOUT, Chapter
-from .results import Shown, commands, in_view
+from .results import Shown, command_of, in_view
 
 
 def markdown(chapters: Sequence[Chapter], out: Path, command: str, date: str) -> str:
@@ -27,7 +27,7 @@ def markdown(chapters: Sequence[Chapter], out: Path, command: str, date: str) ->
                 f"### {entry.description}",
                 f"`{entry.name}` · {entry.reproduces} · preset {run.preset} · {run.date} · "
                 f"{run.machine}{stale}",
-                f"```\n{commands(run.environment)}\n```",
+                f"```\n{command_of(run.environment)}\n```",
                 *(part for table in run.tables for part in _table(table)),
             ]
             for caption, path in run.pictures:

@@ -18,7 +18,7 @@ from typing import Any
 from .errors import UserError
 from .places import Place
 from .report import to_json, write
-from .results import commands
+from .results import command_of
 from .sources import ROOT
 
 _HERE = ROOT / "experiments"
@@ -43,9 +43,9 @@ def renew(out: Path, preset: str) -> list[Path]:
     return [_HERE / "summary.json", ROOT / "README.md"]
 
 
-def filled(readme: str, summary: Mapping[str, Any] | None = None) -> str:
+def filled(readme: str, summary: Mapping[str, Any]) -> str:
     """`readme` with its blocks from ``summary.md``, their numbers from ``summary.json``."""
-    figures = dict((summary or _summary())["figures"])
+    figures = dict(summary["figures"])
     if _BENCHMARKS in (wanted := _wanted(readme)):
         folder = ROOT / "benchmarks" / "measured"
         _take(figures, folder, _BENCHMARKS, wanted[_BENCHMARKS])
@@ -68,9 +68,9 @@ def filled(readme: str, summary: Mapping[str, Any] | None = None) -> str:
     return _BLOCK.sub(block, readme)
 
 
-def unlike(readme: str, summary: Mapping[str, Any] | None = None) -> list[str]:
+def unlike(readme: str) -> list[str]:
     """What in README.md is not as its source has it, a sentence each; none where all is."""
-    summary = summary or _summary()
+    summary = _summary()
     pairs = itertools.zip_longest(readme.splitlines(), filled(readme, summary).splitlines())
     found = [f"README.md has {has!r}, its source {own!r}" for has, own in pairs if has != own]
     for name in _PICTURE.findall(readme):
@@ -124,7 +124,7 @@ def _take(figures: dict[str, Any], folder: Path, experiment: str, keys: list[str
         except ValueError as error:
             raise UserError(f"README.md: {experiment} | {key}: {error}") from None
     figures[experiment] = {
-        "command": commands(ran),
+        "command": command_of(ran),
         "date": ran["date"][:10],
         "cpu": ran["cpu"],
         "versions": {name: text for name, text in ran["versions"].items() if text},

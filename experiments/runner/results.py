@@ -273,7 +273,7 @@ def unfinished(entry: Entry, out: Path) -> str:
     return ""
 
 
-def commands(run: Mapping[str, Any]) -> str:
+def command_of(run: Mapping[str, Any]) -> str:
     """The line that makes the results, without the folders of whoever made them."""
     words = shlex.split(run["command"])
     for option in ("--out", "--data"):
