@@ -1,6 +1,6 @@
 """Pictures and plots: views of a mesh, panels side by side, animations, logarithmic axes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -12,9 +12,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from cycler import cycler
 from jaxtyping import Array, ArrayLike, Float
-from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
@@ -161,13 +161,17 @@ def draw_panels(
 def animate(path: Path, frames: Sequence[Sequence[Panel]]) -> None:
     """Write a GIF: in each frame panels side by side, the bars of the first one's below them."""
     sheet = _lay_out([frames[0]], GROUND, "white")
-    writer = PillowWriter(fps=10)
-    with writer.saving(sheet.figure, str(path), _DPI):
+    canvas = FigureCanvasAgg(sheet.figure)
+
+    def drawn() -> Iterator[np.ndarray]:
         for frame in frames:
             for image, title, panel in zip(sheet.images, sheet.titles, frame, strict=True):
                 image.set_data(panel.image)
                 title.set_text(panel.title)
-            writer.grab_frame(facecolor=sheet.figure.get_facecolor())
+            canvas.draw()
+            yield np.asarray(canvas.buffer_rgba())[..., :3]
+
+    imaging.write_movie(path, drawn(), fps=10.0, encoding="srgb", progress=False)
     plt.close(sheet.figure)
 
 
