@@ -63,7 +63,13 @@ def _card(stem: str, pictures: dict[str, bytes]) -> str:
 def _opening(notebook: nbformat.NotebookNode) -> tuple[str, str]:
     """Title and first paragraph."""
     heading, _, rest = notebook.cells[0]["source"].partition("\n")
-    return heading.removeprefix("# "), " ".join(rest.strip().split("\n\n")[0].split())
+    about = " ".join(rest.strip().split("\n\n")[0].split())
+    return heading.removeprefix("# "), _with_links(about)
+
+
+def _with_links(text: str) -> str:
+    """Links to `../docs/PAGE.md`, right in Jupyter and on a forge, made those of the site."""
+    return re.sub(r"\]\(\.\./docs/", "](../", text)
 
 
 def _shown(notebook: nbformat.NotebookNode, stem: str, pictures: dict[str, bytes]) -> Iterator[str]:
@@ -74,7 +80,7 @@ def _shown(notebook: nbformat.NotebookNode, stem: str, pictures: dict[str, bytes
         if cell["cell_type"] == "markdown":
             if number == 0:
                 yield "---\nhide: [toc]\n---"
-            yield re.sub(r"\]\(\.\./docs/", "](../", source)
+            yield _with_links(source)
             if number == 0:
                 yield f"*A tutorial: [the notebook]({stem}.ipynb), executed.*"
             continue
