@@ -118,6 +118,11 @@ def test_private_files_are_imported_through_doors_only():
     assert found == set()
 
 
+def test_the_page_names_each_door():
+    page = (ROOT / "docs/architecture.md").read_text("utf-8")
+    assert {door for door in DOORS if f"`{door.replace('.', '/')}.py`" not in page} == set()
+
+
 def test_modules_import_only_from_floors_below():
     found = set()
     for path in SOURCES[1:]:
