@@ -130,12 +130,12 @@ def run(config: InverseDaylight, context: Context) -> Table:
                 context.record(_row(number, way, truth, found, config))
                 if number == 0 and way == config.ways[-1]:
                     # Of the vertices, as one sees them: the fit's pixels are few.
-                    observed = _picture(truth, whole, config.albedo, shadows=way != "none")
+                    truly = _picture(truth, whole, config.albedo, shadows=way != "none")
                     again = _render(found.value, whole, config)
                     seen = Truth(
                         config.model, np.asarray(found.value.sun), float(found.value.turbidity)
                     )
-                    shown.append(Shown(truth, observed, again, found.value, seen))
+                    shown.append(Shown(truth, truly, again, found.value, seen))
     caption = (
         f"the mesh as it is lit, of which {config.height} × {config.height} pixels with noise were "
         "observed, and as the light that was found lights it; the true light and the one found, "
