@@ -7,7 +7,6 @@ and against paths where light bounces.
 
 import dataclasses
 import functools
-import statistics
 import warnings
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -19,8 +18,9 @@ from jaxtyping import Array, Float
 
 from jaxsh import geometry, harmonics, imaging, sphere, transfer
 
-from ..runner import Column, Context, Table, experiment
+from ..runner import Context, Table, experiment
 from .bake import OFFSET, Subject, bake, bounces_alone, relative_error
+from .first_light_tables import tables
 from .pictures import Picture, draw_errors, draw_sheet, draw_variants
 from .reference import Estimate, irradiance
 from .still import draw_still
@@ -131,7 +131,7 @@ def run(config: FirstLight, context: Context) -> list[Table]:
     draw_variants(context.path("variants.png", caption), [row[0] for row in pictures])
     rows = [row for row in context.rows if "variant" in row]
     draw_errors(context.path("errors.png", "error of the irradiance by degree"), rows)
-    return list(_tables(config, context))
+    return list(tables(context, config.degrees, round(_WIDTH * config.size)))
 
 
 class Light(NamedTuple):
@@ -257,97 +257,3 @@ def _errors(
                         error = relative_error(got, reference[other].value)
                         row[f"error_to_{other.replace(' ', '_')}"] = error
             yield row
-
-
-def _tables(config: FirstLight, context: Context) -> Iterator[Table]:
-    bakes = [row for row in context.rows if "bake_seconds" in row]
-    errors = [row for row in context.rows if "variant" in row]
-    yield _goals(config, bakes[0])
-    yield _by_degree(config, errors)
-    yield _worth(config, errors)
-    yield _times(config, context, bakes)
-    yield Table(
-        "Meshes",
-        rows=bakes,
-    )
-
-
-def _goals(config: FirstLight, first: dict[str, Any]) -> Table:
-    """What was asked of the bake, of the first mesh in the table."""
-    rows = [
-        {"goal": what, "limit": limit, "measured": first[key]}
-        for what, limit, key in (
-            ("bake / its rays alone, wall clock", 1.5, "bake_to_rays"),
-            ("bake / its rays alone, CPU time", 1.5, "bake_to_rays_cpu"),
-            ("peak memory, MB", 1500.0, "peak_megabytes"),
-            ("relative RMS error of the transfer, %", 1.0, "transfer_error"),
-            ("shading / reading the coefficients once", None, "shade_to_read"),
-        )
-    ]
-
-    return Table("Goals", rows=rows, values={"first": first, "degree": max(config.degrees)})
-
-
-def _by_degree(config: FirstLight, errors: list[dict[str, Any]]) -> Table:
-    rows: dict[tuple[str, ...], dict[str, Any]] = {}
-    for row in errors:
-        key = tuple(row[name] for name in ("mesh", "environment", "variant"))
-        line = rows.setdefault(key, {k: row[k] for k in ("mesh", "environment", "variant")})
-        line["suns"], line["reference"] = row["suns"], row["reference_error"]
-        for key in ("error", "psnr", "error_split", "psnr_split"):
-            line[f"{key} {row['degree']}"] = row[key]
-    columns = [
-        *(Column(name, name) for name in ("mesh", "environment", "variant")),
-        *(Column(f"error {d}", f"degree {d}: error, %", digits=2) for d in config.degrees),
-        Column("suns", "suns split off", digits=0),
-        *(
-            Column(f"error_split {d}", f"degree {d} with suns split: error, %", digits=2)
-            for d in config.degrees
-        ),
-        Column("reference", "reference's own, %", digits=2),
-        *(Column(f"psnr {d}", f"degree {d}: PSNR, dB", digits=1) for d in config.degrees),
-        *(
-            Column(f"psnr_split {d}", f"degree {d} with suns split: PSNR, dB", digits=1)
-            for d in config.degrees
-        ),
-    ]
-    return Table("Irradiance by degree", columns, list(rows.values()))
-
-
-def _worth(config: FirstLight, errors: list[dict[str, Any]]) -> Table:
-    rows: dict[tuple[str, str], dict[str, Any]] = {}
-    for row in errors:
-        if row["degree"] == max(config.degrees):
-            key = row["mesh"], row["environment"]
-            line = rows.setdefault(key, dict(zip(("mesh", "environment"), key, strict=True)))
-            line[f"{row['variant']} to shadowed"] = row["error_to_shadowed"]
-            line[f"{row['variant']} to one bounce"] = row["error_to_one_bounce"]
-
-    return Table(
-        "What shadows and a bounce are worth",
-        rows=list(rows.values()),
-        values={"degree": max(config.degrees)},
-    )
-
-
-def _times(config: FirstLight, context: Context, bakes: list[dict[str, Any]]) -> Table:
-    rows = []
-    for row in bakes:
-        stages = {
-            stage: context.times[f"{row['mesh']}: {stage}"]["seconds"]
-            for stage in ("suns", "raster", "reference")
-        }
-        rows.append(row | stages | {"rays": row["rays"] / 1e6})
-    projections = [
-        times["run_seconds"] for name, times in context.times.items() if name.startswith("project ")
-    ]
-
-    return Table(
-        "Times",
-        rows=rows,
-        values={
-            "degree": max(config.degrees),
-            "projecting_ms": 1000.0 * statistics.median(projections),
-            "width": round(_WIDTH * config.size),
-        },
-    )
