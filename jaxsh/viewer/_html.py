@@ -91,7 +91,17 @@ def export_html(
     path = as_path(path)
     check_place(path)
     scene = make_scene(
-        transfer, light, faces, albedo, camera, exposure, names, title, values, sky, lamp
+        transfer,
+        light,
+        faces,
+        albedo,
+        camera=camera,
+        exposure=exposure,
+        names=names,
+        title=title,
+        values=values,
+        sky=sky,
+        lamp=lamp,
     )
     arrays = base64.b64encode(gzip.compress(scene.arrays, mtime=0)).decode("ascii")
     page = Template(text("page.html")).substitute(

@@ -21,9 +21,8 @@ _WINDOWS = ("none", "hann", "lanczos", "zonal-sinc", "positive")
 class Lights(NamedTuple):
     """Holds what a page is told of its lights: those that are given, the sky, the lamp."""
 
-    coefficients: Float[
-        np.ndarray, "lights 3 k"
-    ]  # of the sky, those of its first sun; of a lamp, 0
+    # Of the sky, those of its first sun; of a lamp, 0.
+    coefficients: Float[np.ndarray, "lights 3 k"]
     kinds: list[str]  # "given", "sky" or "lamp", of each
     facts: dict[str, Any]  # for the header
     arrays: dict[str, np.ndarray]

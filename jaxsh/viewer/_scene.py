@@ -51,6 +51,7 @@ def make_scene(
     light: Float[ArrayLike, "*lights 3 k"] | None,
     faces: Int[ArrayLike, "f 3"],
     albedo: Float[ArrayLike, "..."] | Material,
+    *,
     camera: Camera | None,
     exposure: float | None,
     names: Sequence[str] | None,
@@ -77,11 +78,7 @@ def make_scene(
     check_type("title", title, str)
     positions = np.asarray(transfer.positions, np.float32)
     check_finite("positions of the transfer", positions, wait=True)
-    seen = positions[np.unique(corners)]  # what no face has would be beside the picture
-    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
-    radius = float(np.linalg.norm(seen - middle, axis=1).max())
-    if radius == 0:
-        raise ValueError(f"expected a mesh, got faces whose corners are all at {middle.tolist()}")
+    middle, radius = _ball_around(positions, corners)
     if camera is None:
         camera = Camera.facing(
             Mesh(jnp.asarray(positions), jnp.asarray(corners), jnp.asarray(positions))
@@ -175,6 +172,16 @@ def _checked_faces(faces: Any, count: int) -> np.ndarray:
         raise ValueError(f"expected faces (f, 3), at least one, got shape {array.shape}")
     check_faces("the mesh", array, count)
     return array.astype(np.int32)
+
+
+def _ball_around(positions: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, float]:
+    """Middle and radius of what is seen: what no face has would be beside the picture."""
+    seen = positions[np.unique(corners)]
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    radius = float(np.linalg.norm(seen - middle, axis=1).max())
+    if radius == 0:
+        raise ValueError(f"expected a mesh, got faces whose corners are all at {middle.tolist()}")
+    return middle, radius
 
 
 def _packed_albedo(albedo: Any, count: int) -> tuple[list[float], np.ndarray | None]:

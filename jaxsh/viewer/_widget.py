@@ -66,7 +66,17 @@ def view(
     """
     height = check_size("height", height, 100)
     scene = make_scene(
-        transfer, light, faces, albedo, camera, exposure, names, title, values, sky, lamp
+        transfer,
+        light,
+        faces,
+        albedo,
+        camera=camera,
+        exposure=exposure,
+        names=names,
+        title=title,
+        values=values,
+        sky=sky,
+        lamp=lamp,
     )
     return _widget_class()(scene, height, Still(transfer, faces, albedo, height, lamp))
 
