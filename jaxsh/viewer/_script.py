@@ -6,10 +6,11 @@ from importlib.resources import files
 
 # Each after those that it imports from.
 _MODULES = (
-    *("harmonics", "vectors", "scene", "gl", "controls", "sky", "near", "factors", "near_shading"),
-    *("python_text", "handle", "sun_handle", "light_parts", "glossy", "glossy_part", "parts"),
+    *("harmonics", "vectors", "scene", "sides", "gl", "controls", "renderer"),
+    *("sky", "near", "factors", "near_shading", "python_text"),
+    *("handle", "lamp_handle", "sun_handle", "light_parts", "glossy", "glossy_part", "parts"),
     *("ball", "pointer", "view", "save"),
-    *("ramp", "color_bar", "picking", "overlay", "panel", "renderer", "false_color"),
+    *("ramp", "color_bar", "picking", "overlay", "panel", "false_color"),
     *("lobe", "viewer"),
 )
 _IMPORT = re.compile(r"^import\s[^;]*?from\s+\"(\./\w+)\.js\";\n", re.MULTILINE)

@@ -13,7 +13,7 @@ import viewer_pages as pages
 from scipy.ndimage import binary_erosion
 
 from jaxsh import harmonics, imaging, transfer, viewer
-from jaxsh.viewer._script import script, text
+from jaxsh.viewer._script import script, styles
 
 CHROMIUM = pages.chromium()
 pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
@@ -224,7 +224,7 @@ def test_the_widget_draws_and_follows_its_light(browser, file):
     _, made, light, albedo = pages.example()
     header, arrays, _ = pages.parts(file)
     page = browser.new_context().new_page()
-    page.add_style_tag(content=text("style.css"))
+    page.add_style_tag(content=styles())
     page.evaluate(HARNESS, [script("widget"), header, base64.b64encode(arrays).decode()])
     shaded = transfer.shade_diffuse(light, made, albedo)
     assert abs(levels(colors(page)) - levels(shaded)).max() < 0.1

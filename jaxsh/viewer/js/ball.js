@@ -1,4 +1,5 @@
 // The light as a mirror ball shows it: all of its directions but the one straight behind the ball.
+import { make } from "./controls.js";
 import { basis, rotationBlocks, turned } from "./harmonics.js";
 import { axesOf } from "./vectors.js";
 
@@ -7,8 +8,7 @@ const SIZE = 80;
 export class Ball {
   constructor(degree) {
     this.degree = degree;
-    this.canvas = document.createElement("canvas");
-    Object.assign(this.canvas, { width: SIZE, height: SIZE, className: "jaxsh-ball" });
+    this.canvas = make("canvas", { width: SIZE, height: SIZE, className: "jaxsh-ball" });
     this.canvas.title = "The light in a mirror ball: drag it to turn the light";
     this.context = this.canvas.getContext("2d");
     this.image = this.context.createImageData(SIZE, SIZE);

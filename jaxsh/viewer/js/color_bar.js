@@ -56,6 +56,25 @@ function levelPatches(context, labels, ink) {
   });
 }
 
+// As `FalseColor` shows what is below the ramp.
+function stripes(context, top, thick) {
+  context.save();
+  context.fillStyle = "rgb(191 191 191)";
+  context.fillRect(PAD, top, 18, thick);
+  context.beginPath();
+  context.rect(PAD, top, 18, thick);
+  context.clip();
+  context.strokeStyle = "rgb(115 115 115)";
+  context.lineWidth = 2.8;
+  for (let x = -thick; x < 30; x += 6) {
+    context.beginPath();
+    context.moveTo(PAD + x, top);
+    context.lineTo(PAD + x + thick, top + thick);
+    context.stroke();
+  }
+  context.restore();
+}
+
 function ramp(context, { low, high, under, over }, ink) {
   const [top, thick] = [28, 12];
   const left = PAD + (under ? 30 : 0);
@@ -65,23 +84,7 @@ function ramp(context, { low, high, under, over }, ink) {
   context.fillStyle = gradient;
   context.fillRect(left, top, width, thick);
   if (under) {
-    context.fillStyle = "rgb(191 191 191)";
-    context.fillRect(PAD, top, 18, thick);
-    context.beginPath();
-    context.rect(PAD, top, 18, thick);
-    context.clip();
-    context.strokeStyle = "rgb(115 115 115)";
-    context.lineWidth = 2.8;
-    for (let x = -thick; x < 30; x += 6) {
-      context.beginPath();
-      context.moveTo(PAD + x, top);
-      context.lineTo(PAD + x + thick, top + thick);
-      context.stroke();
-    }
-    context.restore();
-    context.save();
-    context.font = FONT;
-    context.textBaseline = "middle";
+    stripes(context, top, thick);
     context.fillStyle = ink;
     context.textAlign = "center";
     context.fillText("< 0", PAD + 9, top + thick + 11);

@@ -67,6 +67,21 @@ export function choice(label, names, changed) {
 
 let choices = 0;
 
+// A control that shows what `read` takes of the state, whenever that has changed.
+export const bound = (control, read) => ({
+  ...control,
+  show: (state) => control.set(read(state)),
+});
+
+// A control that is seen while `when` holds of the state.
+export const seenIf = (when, control) => ({
+  element: control.element,
+  show: (state) => {
+    control.element.hidden = !when(state);
+    control.show(state);
+  },
+});
+
 // Controls under a heading that folds them away.
 export function group(title, controls, buttons = [], open = true) {
   const element = make("details", { open }, make("summary", {}, title));

@@ -3,6 +3,7 @@
 // sums light times transfer times lobe over them.
 import { floatTexture, nearest } from "./gl.js";
 import { basis } from "./harmonics.js";
+import { DIFFUSE, TEXEL } from "./renderer.js";
 
 const GROUP = 16; // directions in a pass: four outputs of four numbers
 
@@ -19,7 +20,7 @@ out vec4 some1;
 out vec4 some2;
 out vec4 some3;
 void main() {
-  ivec2 texel = ivec2(gl_VertexID % ${scene.rowLength}, gl_VertexID / ${scene.rowLength});
+  ${TEXEL(scene)}
   float sums[${GROUP}];
   for (int j = 0; j < ${GROUP}; j++) sums[j] = 0.0;
   for (int i = 0; i < ${scene.layers}; i++) {
@@ -63,12 +64,8 @@ vec3 towards(vec3 v) {
   return size > 0.0 ? v / size : v;
 }
 void main() {
-  ivec2 texel = ivec2(gl_VertexID % ${scene.rowLength}, gl_VertexID / ${scene.rowLength});
-  vec3 diffuse = vec3(0.0);
-  for (int i = 0; i < ${scene.layers}; i++) {
-    vec4 some = vec4(texelFetch(transfer, ivec3(texel, i), 0));
-    diffuse += vec3(dot(some, light[3 * i]), dot(some, light[3 * i + 1]), dot(some, light[3 * i + 2]));
-  }
+  ${TEXEL(scene)}
+  ${DIFFUSE(scene)}
   vec3 up = towards(normal);
   vec3 view = towards(eye - position);
   vec3 axis = 2.0 * dot(up, view) * up - view;
@@ -131,7 +128,6 @@ export class GlossyShading {
     gl.useProgram(made);
     gl.uniform1i(gl.getUniformLocation(made, "harmonics"), NODES_UNIT);
     for (let group = 0; group < this.groups; group++) {
-      gl.useProgram(made);
       gl.uniform1i(gl.getUniformLocation(made, "first"), GROUP * group);
       this.renderer.capture(buffers);
       buffers.forEach((buffer, i) => {

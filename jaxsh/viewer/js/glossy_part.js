@@ -1,5 +1,5 @@
 // Gloss as a part of a light: its share and its lobe, and shading that sees the camera.
-import { menu, slider } from "./controls.js";
+import { bound, menu, seenIf, slider } from "./controls.js";
 import { GlossyShading } from "./glossy.js";
 
 // Under a lamp near the mesh the diffuse part alone is shown.
@@ -23,12 +23,8 @@ export const glossyPart = {
     });
     const names = scene.glossy.exponents.map((x) => `${Number(x.toPrecision(4))}`);
     const lobe = menu("Exponent of the glossy lobe", names, (i) => viewer.set({ lobe: i }));
-    return [gloss, lobe].map((control, i) => ({
-      element: control.element,
-      show: (state) => {
-        control.element.hidden = scene.kinds[state.index] === "lamp";
-        control.set(i === 0 ? state.gloss : state.lobe);
-      },
-    }));
+    const controls = [bound(gloss, (state) => state.gloss), bound(lobe, (state) => state.lobe)];
+    const shades = (state) => scene.kinds[state.index] !== "lamp";
+    return controls.map((control) => seenIf(shades, control));
   },
 };

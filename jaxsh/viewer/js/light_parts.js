@@ -1,7 +1,7 @@
 // The window, the sky and the lamp as parts of a light: their state, their controls and their coefficients.
-import { menu, slider, toggle } from "./controls.js";
+import { bound, make, menu, seenIf, slider, toggle } from "./controls.js";
 import { factorsOf, scaledBy } from "./factors.js";
-import { LampHandle } from "./handle.js";
+import { LampHandle } from "./lamp_handle.js";
 import { interpolated, keptNear, lampTerms } from "./near.js";
 import { NearShading } from "./near_shading.js";
 import { number, row } from "./python_text.js";
@@ -29,7 +29,7 @@ export const windowPart = {
     const kinds = Object.keys(viewer.scene.windows);
     const names = kinds.map((kind) => WINDOWS[kind] ?? kind);
     const chosen = menu("Window against ringing", names, (i) => viewer.set({ window: kinds[i] }));
-    return [{ ...chosen, show: (state) => chosen.set(kinds.indexOf(state.window)) }];
+    return [bound(chosen, (state) => kinds.indexOf(state.window))];
   },
   // The light of a sky stands above; another is the user's.
   python: (state, scene) => {
@@ -131,25 +131,25 @@ function skyControls(viewer) {
     viewer.set({ ...changes, sun: sunAt(time, latitude, longitude) });
   };
   const degrees = (x) => `${x.toFixed(0)}°`;
-  const shown = (control, read) => ({ ...control, show: (state) => control.set(read(state)) });
   const controls = [
     new SunHandle(viewer),
-    shown(slider("Sun above the horizon", {
+    bound(slider("Sun above the horizon", {
       min: 0, max: 90, step: 1, value: 0, said: degrees,
       changed: (up) => viewer.set({ sun: sunFrom(up, bearingOf(viewer.state.sun)) }),
     }), ({ sun }) => heightOf(sun)),
-    shown(slider("Sun's bearing from north", {
+    bound(slider("Sun's bearing from north", {
       min: 0, max: 360, step: 1, value: 0, said: degrees,
       changed: (around) => viewer.set({ sun: sunFrom(Math.max(0, heightOf(viewer.state.sun)), around) }),
     }), ({ sun }) => bearingOf(sun)),
-    shown(slider("Turbidity (haze)", {
+    bound(slider("Turbidity (haze)", {
       min: range[0], max: range[1], step: 0.1, value: range[0], said: (x) => x.toFixed(1),
       changed: (turbidity) => viewer.set({ turbidity }),
     }), ({ turbidity }) => turbidity),
-    inRow(shown(toggle("The sun itself", (disc) => viewer.set({ disc })), ({ disc }) => disc)),
+    inRow(bound(toggle("The sun itself", (disc) => viewer.set({ disc })), ({ disc }) => disc)),
     ...placeControls(placed),
   ];
-  return controls.map((control) => onlyFor("sky", viewer.scene, control));
+  const under = (state) => kindOf(viewer.scene, state) === "sky";
+  return controls.map((control) => seenIf(under, control));
 }
 
 // Date, time and place: the sun stands where they say once one of them is changed.
@@ -162,11 +162,9 @@ function placeControls(placed) {
     changed: (x) => placed({ time: now + (x - minutesOf(now)) * 60000 }),
   });
   const field = (label, properties, changed) => {
-    const input = Object.assign(document.createElement("input"), properties);
+    const input = make("input", properties);
     input.addEventListener("change", () => input.checkValidity() && input.value && changed(input));
-    const element = Object.assign(document.createElement("label"), { className: "jaxsh-field" });
-    element.append(label, input);
-    return { element, input };
+    return { element: make("label", { className: "jaxsh-field" }, label, input), input };
   };
   const date = field("Date", { type: "date", min: "1900-01-01", max: "2100-12-31" }, (input) =>
     placed({ time: input.valueAsNumber + minutesOf(now) * 60000 }));
@@ -174,17 +172,17 @@ function placeControls(placed) {
     placed({ latitude: input.valueAsNumber }));
   const longitude = field("Longitude", { type: "number", min: -360, max: 360, step: "any" }, (input) =>
     placed({ longitude: input.valueAsNumber }));
-  const night = { element: Object.assign(document.createElement("p"), { className: "jaxsh-said" }) };
+  const night = make("p", { className: "jaxsh-said" });
   return [
     { element: date.element, show: ({ time }) => {
       now = time;
       date.input.value = new Date(time).toISOString().slice(0, 10);
     } },
-    { element: clock.element, show: ({ time }) => clock.set(minutesOf(time)) },
+    bound(clock, ({ time }) => minutesOf(time)),
     { element: latitude.element, show: (state) => (latitude.input.value = state.latitude) },
     { element: longitude.element, show: (state) => (longitude.input.value = state.longitude) },
-    { element: night.element, show: ({ sun }) => {
-      night.element.textContent = sun[2] < 0
+    { element: night, show: ({ sun }) => {
+      night.textContent = sun[2] < 0
         ? "The sun is below the horizon: dark here, for the model has no twilight." : "";
     } },
   ];
@@ -192,18 +190,5 @@ function placeControls(placed) {
 
 // A button in a row of its own.
 function inRow(control) {
-  const element = Object.assign(document.createElement("div"), { className: "jaxsh-buttons jaxsh-row" });
-  element.append(control.element);
-  return { ...control, element };
-}
-
-// A control that is seen while the light is of a kind.
-export function onlyFor(kind, scene, control) {
-  return {
-    element: control.element,
-    show: (state) => {
-      control.element.hidden = kindOf(scene, state) !== kind;
-      control.show(state);
-    },
-  };
+  return { ...control, element: make("div", { className: "jaxsh-buttons jaxsh-row" }, control.element) };
 }

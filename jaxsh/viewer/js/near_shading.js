@@ -1,5 +1,7 @@
 // Shades each vertex by the light of a lamp near it, on the graphics processor.
 import { floatTexture } from "./gl.js";
+import { TEXEL } from "./renderer.js";
+
 // The grid's trilinear weights, and half of the gradient of each of the eight samples around a vertex
 // (midrange.interpolate, rule "half"). Scales and factors are in the texture: across, four terms of each
 // sample, and downwards layers of four coefficients, channel after channel.
@@ -17,7 +19,7 @@ in vec3 position;
 out vec3 radiance;
 const ivec3 shape = ivec3(${scene.near.grid.shape});
 void main() {
-  ivec2 texel = ivec2(gl_VertexID % ${scene.rowLength}, gl_VertexID / ${scene.rowLength});
+  ${TEXEL(scene)}
   vec3 place = (position - lower) / spacing;
   ivec3 cell = clamp(ivec3(floor(place)), ivec3(0), shape - 2);
   vec3 share = place - vec3(cell);

@@ -1,5 +1,5 @@
 // The panel beside the picture, in groups that fold.
-import { button, choice, group, menu, panelOf, slider, toggle, words } from "./controls.js";
+import { bound, button, choice, group, menu, panelOf, seenIf, slider, toggle, words } from "./controls.js";
 import { PARTS } from "./parts.js";
 
 const stops = (x) => `${x < 0 ? "−" : "+"}${Math.abs(x).toFixed(1)} stops`;
@@ -69,13 +69,3 @@ const HELP = [
 ];
 
 const help = () => group("Mouse, touch and keys", [{ element: words(HELP) }], [], false);
-
-const seenIf = (when, control) => ({
-  ...control,
-  show: (state) => {
-    control.element.hidden = !when(state);
-    control.show(state);
-  },
-});
-
-const bound = (control, read) => ({ ...control, show: (state) => control.set(read(state)) });

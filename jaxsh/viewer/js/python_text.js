@@ -1,4 +1,5 @@
 // The present view, as Python that draws the same.
+import { make } from "./controls.js";
 import { tangentOf } from "./vectors.js";
 
 // As a float of Python has it.
@@ -35,7 +36,7 @@ export async function copied(text) {
     await navigator.clipboard.writeText(text);
     return true;
   } catch {
-    const field = Object.assign(document.createElement("textarea"), { value: text });
+    const field = make("textarea", { value: text });
     field.style.cssText = "position: fixed; opacity: 0";
     document.body.append(field);
     field.select();

@@ -1,9 +1,19 @@
 // Shades the vertices on the graphics processor, once per light, and draws the mesh.
-import { fill, program } from "./gl.js";
+import { fill, nearest, program } from "./gl.js";
 import { clipMatrix, dot, minus } from "./vectors.js";
 
-// Transfer as 16-bit integers, four coefficients in a texel, vertices along the rows of a layer.
-// Their scales, 1/π and the intensity are in the light.
+// Transfer as 16-bit integers, four coefficients in a texel, vertices along the rows of a layer: the
+// steps of shaders that find a vertex's `texel`, and sum up what is `diffuse`. Scales, 1/π and the
+// intensity are in the light.
+export const TEXEL = ({ rowLength }) =>
+  `ivec2 texel = ivec2(gl_VertexID % ${rowLength}, gl_VertexID / ${rowLength});`;
+export const DIFFUSE = ({ layers }) => `
+  vec3 diffuse = vec3(0.0);
+  for (int i = 0; i < ${layers}; i++) {
+    vec4 some = vec4(texelFetch(transfer, ivec3(texel, i), 0));
+    diffuse += vec3(dot(some, light[3 * i]), dot(some, light[3 * i + 1]), dot(some, light[3 * i + 2]));
+  }`;
+
 const SHADE = (scene) => `#version 300 es
 precision highp float;
 precision highp isampler2DArray;
@@ -12,13 +22,9 @@ uniform vec4 light[${3 * scene.layers}];
 in vec3 albedo;
 out vec3 radiance;
 void main() {
-  ivec2 texel = ivec2(gl_VertexID % ${scene.rowLength}, gl_VertexID / ${scene.rowLength});
-  vec3 sum = vec3(0.0);
-  for (int i = 0; i < ${scene.layers}; i++) {
-    vec4 some = vec4(texelFetch(transfer, ivec3(texel, i), 0));
-    sum += vec3(dot(some, light[3 * i]), dot(some, light[3 * i + 1]), dot(some, light[3 * i + 2]));
-  }
-  radiance = albedo * sum;
+  ${TEXEL(scene)}
+  ${DIFFUSE(scene)}
+  radiance = albedo * diffuse;
 }`;
 
 // The second shader of a program that only shades.
@@ -89,9 +95,7 @@ export class Renderer {
     gl.texSubImage3D(
       gl.TEXTURE_2D_ARRAY, 0, 0, 0, 0, width, height, depth, format, type, scene.transfer,
     );
-    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
-      gl.texParameteri(gl.TEXTURE_2D_ARRAY, filter, gl.NEAREST);
-    }
+    nearest(gl, gl.TEXTURE_2D_ARRAY);
   }
 
   // Two sides, A and B, have the mesh in common; each has radiance of its own.

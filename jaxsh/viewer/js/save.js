@@ -1,9 +1,10 @@
 // Files that the page gives.
+import { make } from "./controls.js";
 
 // Saves RGBA whose colors are times their alpha, as `pictureOf` reads it, as a PNG that is
 // transparent around the mesh; `draws` may draw over it.
 export function saveImage(pixels, width, height, draws) {
-  const picture = Object.assign(document.createElement("canvas"), { width, height });
+  const picture = make("canvas", { width, height });
   for (let i = 0; i < pixels.length; i += 4) {
     const alpha = pixels[i + 3];
     if (alpha === 0 || alpha === 255) continue;
@@ -12,8 +13,5 @@ export function saveImage(pixels, width, height, draws) {
   const context = picture.getContext("2d");
   context.putImageData(new ImageData(pixels, width, height), 0, 0);
   draws(context);
-  const link = document.createElement("a");
-  link.download = "jaxsh.png";
-  link.href = picture.toDataURL("image/png");
-  link.click();
+  make("a", { download: "jaxsh.png", href: picture.toDataURL("image/png") }).click();
 }

@@ -27,3 +27,10 @@ export async function decompressed(text) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).arrayBuffer();
 }
+
+// The number of a code of 16 bits between two others, without the digits that the codes do not tell.
+export function decoded(code, low, high) {
+  const digits = Math.floor(-Math.log10((high - low) / 65535 || 1));
+  const value = low + (code / 65535) * (high - low);
+  return digits >= 0 && digits <= 100 ? Number(value.toFixed(digits)) : value;
+}

@@ -3,6 +3,8 @@
 import { basis } from "./harmonics.js";
 import { unit } from "./vectors.js";
 
+const RADIANS = Math.PI / 180; // in a degree
+
 // Coefficients of sky.preetham_harmonics(sun, turbidity, …, table="wide"), and with `disc` those of
 // sky.sun_harmonics besides: three arrays of K numbers, kcd/m² times `sky.gain`. `table` is of the sky's
 // own degree, above which there is the disc alone. Below the horizon the sun leaves no light.
@@ -83,7 +85,7 @@ function prefactors({ luminance, x, y, zenithX, zenithY }, theta, turbidity) {
 
 // Radiance of the sun's disc, as by sky.sun_radiance, from its tables by wavelength.
 function discRadiance({ disc }, theta, cosine, turbidity) {
-  const mass = 1 / (cosine + 0.15 * (93.885 - (theta * 180) / Math.PI) ** -1.253);
+  const mass = 1 / (cosine + 0.15 * (93.885 - theta / RADIANS) ** -1.253);
   const beta = 0.04608 * turbidity - 0.04586;
   const passed = disc.rayleigh.map((rayleigh, i) => {
     const water = disc.water[i] * mass;
@@ -99,8 +101,7 @@ function discRadiance({ disc }, theta, cosine, turbidity) {
 // degrees, north and east positive. Meeus, Astronomical Algorithms, chapter 25, the lower accuracy, as
 // NOAA's calculator has it: within 0.01° from 1950 to 2050. No refraction.
 export function sunAt(time, latitude, longitude) {
-  const radians = Math.PI / 180;
-  const [sin, cos] = [Math.sin, Math.cos].map((f) => (degrees) => f(degrees * radians));
+  const [sin, cos] = [Math.sin, Math.cos].map((f) => (degrees) => f(degrees * RADIANS));
   const days = time / 86400000 - 10957.5; // since noon of 2000-01-01
   const t = days / 36525;
   const anomaly = 357.52911 + t * (35999.05029 - 0.0001537 * t);
@@ -110,7 +111,7 @@ export function sunAt(time, latitude, longitude) {
   const along = 280.46646 + t * (36000.76983 + 0.0003032 * t) + center - 0.00569
     - 0.00478 * sin(node);
   const tilt = 23.4392911 - t * (0.0130042 + t * (1.64e-7 - 5.04e-7 * t)) + 0.00256 * cos(node);
-  const ascension = Math.atan2(cos(tilt) * sin(along), cos(along)) / radians;
+  const ascension = Math.atan2(cos(tilt) * sin(along), cos(along)) / RADIANS;
   const sine = sin(tilt) * sin(along);
   const cosine = Math.sqrt(1 - sine * sine);
   const sidereal = 280.46061837 + 360.98564736629 * days + 0.000387933 * t * t
@@ -125,8 +126,6 @@ export function sunAt(time, latitude, longitude) {
 
 // Minutes since midnight, UTC; before 1970 times are negative.
 export const minutesOf = (time) => (((Math.floor(time / 60000) % 1440) + 1440) % 1440);
-
-const RADIANS = Math.PI / 180;
 
 // Degrees of a sun above the horizon.
 export const heightOf = ([x, y, z]) => Math.atan2(z, Math.hypot(x, y)) / RADIANS;

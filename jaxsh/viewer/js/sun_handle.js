@@ -1,32 +1,16 @@
 // The sun on the mirror ball: a ring around its reflection, which is dragged.
+import { Handle } from "./handle.js";
 import { bearingOf, heightOf, keptUp, sunFrom } from "./sky.js";
 import { axesOf, dot } from "./vectors.js";
 
 const SUN_STEPS = { ArrowLeft: [0, -3], ArrowRight: [0, 3], ArrowUp: [3, 0], ArrowDown: [-3, 0] };
 const SUN_HINT = "Drag the sun on the mirror ball, or set it here.";
 
-export class SunHandle {
+export class SunHandle extends Handle {
   constructor(viewer) {
-    this.viewer = viewer;
-    this.element = document.createElement("p");
-    Object.assign(this.element, { className: "jaxsh-said", textContent: SUN_HINT });
-    this.button = document.createElement("button");
-    Object.assign(this.button, { type: "button", className: "jaxsh-sun", title: "The sun: drag it" });
-    this.button.setAttribute("aria-label", "Sun: arrows move it around the horizon, up and down");
+    const properties = { className: "jaxsh-sun", title: "The sun: drag it" };
+    super(viewer, "sky", SUN_HINT, properties, "Sun: arrows move it around the horizon, up and down");
     this.#listen();
-  }
-
-  // Called whenever the state has changed.
-  show(state) {
-    const hidden = this.viewer.scene.kinds[state.index] !== "sky";
-    this.element.hidden = this.button.hidden = this.hidden = hidden;
-    if (hidden) return;
-    if (!this.observer) {
-      this.viewer.stage.append(this.button);
-      this.observer = new ResizeObserver(() => this.#place());
-      this.observer.observe(this.viewer.canvas);
-    }
-    this.#place();
   }
 
   // Center and radius of the ball of the side that the panel changes.
@@ -39,8 +23,7 @@ export class SunHandle {
   }
 
   // The ball's normal is halfway between the eye, which is far away, and the sun.
-  #place() {
-    if (this.hidden) return;
+  place() {
     const { camera, sun } = this.viewer.state;
     const [x, y, away] = axesOf(camera).map((axis) => dot(axis, sun));
     const length = Math.hypot(x, y, 1 - away);

@@ -1,5 +1,6 @@
 // A mesh under a light that can be turned, dimmed and cut: its state, and what is drawn of it.
 import { barHeight, drawBar, shortNumber } from "./color_bar.js";
+import { make } from "./controls.js";
 import { FalseColor } from "./false_color.js";
 import { pictureOf } from "./gl.js";
 import { rotationBlocks, turned } from "./harmonics.js";
@@ -12,14 +13,9 @@ import { listenToDrags, listenToKeys, listenToWheel } from "./pointer.js";
 import { copied, pythonText } from "./python_text.js";
 import { Renderer } from "./renderer.js";
 import { saveImage } from "./save.js";
+import { decoded } from "./scene.js";
+import { sideRectangles } from "./sides.js";
 import { UNTURNED, View } from "./view.js";
-
-// The number of a code of 16 bits between two others, without the digits that the codes do not tell.
-export function decoded(code, low, high) {
-  const digits = Math.floor(-Math.log10((high - low) / 65535 || 1));
-  const value = low + (code / 65535) * (high - low);
-  return digits >= 0 && digits <= 100 ? Number(value.toFixed(digits)) : value;
-}
 
 export class Viewer {
   // Builds picture and panel in `root`. `scene` is what `unpacked` gives.
@@ -28,18 +24,14 @@ export class Viewer {
     this.scene = scene;
     this.lights = scene.lights;
     this.reset();
-    this.canvas = document.createElement("canvas");
-    this.canvas.tabIndex = 0;
+    this.canvas = make("canvas", { tabIndex: 0 });
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", `${scene.title}: arrows orbit, with Shift they turn the light`);
     root.classList.add("jaxsh");
     this.overlay = new Overlay(this);
-    this.stage = Object.assign(document.createElement("div"), { className: "jaxsh-stage" });
-    this.stage.append(this.canvas, ...this.overlay.elements);
+    this.stage = make("div", { className: "jaxsh-stage" }, this.canvas, ...this.overlay.elements);
     this.panel = makePanel(this);
-    const body = Object.assign(document.createElement("div"), { className: "jaxsh-body" });
-    body.append(this.stage, this.panel.element);
-    root.replaceChildren(body);
+    root.replaceChildren(make("div", { className: "jaxsh-body" }, this.stage, this.panel.element));
     root.viewer = this;
     this.#listen();
     this.#build();
@@ -229,15 +221,8 @@ export class Viewer {
     return this.shared.compare ? [0, 1] : [0];
   }
 
-  // Left, bottom, width and height of each side: beside or, in a high window, above each other.
   #rectangles(width, height) {
-    if (!this.shared.compare) return [[0, 0, width, height]];
-    if (width < height) {
-      const half = Math.floor(height / 2);
-      return [[0, height - half, width, half], [0, 0, width, half]];
-    }
-    const half = Math.floor(width / 2);
-    return [[0, 0, half, height], [width - half, 0, half, height]];
+    return sideRectangles(width, height, this.shared.compare);
   }
 
   #build() {
@@ -245,11 +230,7 @@ export class Viewer {
       this.renderer = new Renderer(this.canvas, this.scene);
     } catch (error) {
       this.renderer = null;
-      this.stage.append(Object.assign(document.createElement("p"), {
-        className: "jaxsh-error",
-        role: "alert",
-        textContent: error.message,
-      }));
+      this.stage.append(make("p", { className: "jaxsh-error", role: "alert" }, error.message));
       return;
     }
     [this.falseColor, this.lobe] = [null, null]; // made when first shown
