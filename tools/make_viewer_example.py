@@ -79,9 +79,10 @@ def make_pictures(page: Path, folder: Path) -> None:
     from playwright.sync_api import sync_playwright
 
     chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
-    options = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    software = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    options = [*software, "--no-sandbox", "--disable-dev-shm-usage"]
     with sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=chromium, args=[*options, "--no-sandbox"])
+        browser = started.chromium.launch(executable_path=chromium, args=options)
         for name, (width, height), dark, state in PICTURES:
             shown = browser.new_page(
                 viewport={"width": width, "height": height},

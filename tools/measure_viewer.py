@@ -88,7 +88,7 @@ def main(vertices: int, degree: int, options: str, seconds: float) -> None:
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as started:
         page = viewer.export_html(Path(folder) / "knot.html", made, light, mesh.faces)
         print(f"{len(mesh.vertices)} vertices, degree {degree}: {page.stat().st_size / 1e6:.1f} MB")
-        arguments = [*options.split(), "--no-sandbox"]
+        arguments = [*options.split(), "--no-sandbox", "--disable-dev-shm-usage"]
         browser = started.chromium.launch(executable_path=chromium, args=arguments)
         shown = browser.new_page(viewport={"width": 1072, "height": 600})
         shown.goto(page.as_uri())
