@@ -125,8 +125,8 @@ def page(rows: dict[str, list[dict[str, Any]]], ran: dict[str, Any]) -> str:
         "# Benchmarks",
         "How long the basis takes beside sphericart, whose kernels are in C++, on the same "
         "directions: values alone, values with their gradients, and a gradient by reverse mode.",
-        "![sphericart's time over jaxsh's by degree: above 1 from degree 6 or 10 up in float32; in "
-        "float64 nearer to 1](images/benchmarks.png)",
+        "![sphericart's time over jaxsh's by degree, in float32 and float64: above 1 jaxsh is "
+        "faster](images/benchmarks.png)",
         f"*{ran['cpu']['count']} cores of an {ran['cpu']['model']}, {ran['date'][:10]}; drawn by "
         "`python -m benchmarks.page`.*",
         "## Time of sphericart over ours",

@@ -9,6 +9,7 @@ from typing import Any
 from .errors import UserError
 from .places import Place
 from .registry import Entry
+from .results import data_of
 
 _PLACE = re.compile(r"\{([^{}|]+)\|([^{}]*)\|([^{}|]+)\|([^{}|]*)\}")
 
@@ -63,5 +64,4 @@ def _filled(template: Path, known: Mapping[str, str], results: Path, preset: str
 def _about(run: Mapping[str, Any]) -> str:
     versions = {name: run["versions"][key] for name, key in (("jaxsh", "jaxsh"), ("JAX", "jax"))}
     names = [f"{name} {version}" for name, version in versions.items() if version]
-    data = run["data"] if run["data"].startswith("the ") else "a data folder"
-    return ", ".join([run["date"][:10], *names, run["dtype"], data])
+    return ", ".join([run["date"][:10], *names, run["dtype"], data_of(run)])

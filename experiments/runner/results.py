@@ -121,15 +121,9 @@ class Run:
             f"Python {ran['python']}",
             ran["dtype"],
             f"seed {ran['seed']}",
-            f"{self.data}",
+            data_of(self.environment),
             f"{ran['seconds']['compile']:.0f} s compiling, {ran['seconds']['run']:.0f} s running",
         ]
-
-    @property
-    def data(self) -> str:
-        """What it read, without the folder's place."""
-        source = self.environment["data"]
-        return source if source.startswith("the ") else "a data folder"
 
     @property
     def date(self) -> str:
@@ -271,6 +265,11 @@ def unfinished(entry: Entry, out: Path) -> str:
             with contextlib.suppress(KeyError, OSError, TypeError, ValueError):
                 return f"{partial.environment['status']} on {partial.date}"
     return ""
+
+
+def data_of(run: Mapping[str, Any]) -> str:
+    """What it read, without the folder's place."""
+    return run["data"] if run["data"].startswith("the ") else "a data folder"
 
 
 def command_of(run: Mapping[str, Any]) -> str:
