@@ -1,7 +1,9 @@
-"""sRGB's curve on NumPy arrays (IEC 61966-2-1), for files; `imaging` has it for JAX."""
+"""sRGB on NumPy arrays (IEC 61966-2-1), for files; `imaging` has its curve for JAX."""
 
 import numpy as np
 from jaxtyping import Float
+
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear R, G, B (Rec. 709)
 
 
 def encode(linear: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape"]:

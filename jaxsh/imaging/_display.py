@@ -12,9 +12,8 @@ from jaxtyping import Array, Bool, Float
 from .._core.checks import as_float, check_choice, check_number, described, is_concrete
 from .._core.linalg import einsum
 from .._core.pictures import as_picture, as_radiance
+from .._core.srgb import LUMINANCE
 from .._core.xla import keep_rows
-
-_LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec. 709
 
 
 def srgb_encode(linear: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
@@ -117,7 +116,7 @@ def _reinhard(
     image: Float[Array, "*shape"], white: float | Float[Array, ""]
 ) -> Float[Array, "*shape"]:
     image = jnp.maximum(image, 0)
-    weights = jnp.asarray(_LUMINANCE, image.dtype)
+    weights = jnp.asarray(LUMINANCE, image.dtype)
     luminance = einsum("...c,c->...", image, weights)[..., None]
     white = jnp.asarray(white, image.dtype)
     return image * ((1 + luminance / white / white) / (1 + luminance))

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogFormatter, StrMethodFormatter
@@ -66,7 +67,7 @@ def _new_panels(shape: tuple[int, ...], size: tuple[float, float]) -> np.ndarray
     return grid.ravel()[:count]
 
 
-def color_bar(axes: Axes | Sequence[Axes], scale: ColorScale, label: str) -> None:
+def color_bar(axes: Axes | Sequence[Axes], scale: ColorScale, label: str) -> Colorbar:
     """Draw a bar beside the axes, from which it takes the room."""
     beside = [axes] if isinstance(axes, Axes) else list(axes)
     bar = beside[0].figure.colorbar(
@@ -79,6 +80,7 @@ def color_bar(axes: Axes | Sequence[Axes], scale: ColorScale, label: str) -> Non
     )
     if isinstance(scale.norm, LogNorm):
         plain_logarithm(bar.ax.yaxis)
+    return bar
 
 
 class _Plain(LogFormatter):

@@ -8,13 +8,13 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
 
-from .._core.checks import check_choice, check_number, check_size
-from ..imaging import auto_exposure, tone_map
+from .._core.checks import check_choice, check_size
 from ..sphere import irradiance, project_lat_long
 from ._axes import flat_axes
-from ._disc import AXES, Toward, disc, frame, name_axes, show_disc
+from ._disc import AXES, Toward, centers, disc, frame, name_axes, show_disc
 from ._negative import mark_negative
 from ._radiance import along, read_light
+from ._tone import Curve, read_tone
 
 _EXACT = 8  # degree at which irradiance of a picture is exact to 0.1 %
 
@@ -25,7 +25,7 @@ def ball(
     of: Literal["radiance", "mirror", "diffuse"] = "radiance",
     toward: Toward = (0.0, -1.0, 0.2),
     exposure: float | None = None,
-    curve: Literal["clip", "reinhard"] = "clip",
+    curve: Curve = "clip",
     white: float = math.inf,
     resolution: int = 256,
     ax: Axes | None = None,
@@ -70,11 +70,8 @@ def ball(
     ['+x', '−x', '+y', '−y', '+z', '−z']
     """
     check_choice("of", of, ("radiance", "mirror", "diffuse"))
-    check_choice("curve", curve, ("clip", "reinhard"))
-    white = check_number("white", white, above=0.0, infinite=True)
+    tone = read_tone(exposure, curve, white)
     resolution = check_size("resolution", resolution, 2)
-    if exposure is not None:
-        exposure = check_number("exposure", exposure, least=0.0)
     viewer = frame(toward)
     values = read_light(light)
     ax = flat_axes(ax, (4.0, 4.2))
@@ -86,15 +83,11 @@ def ball(
         seen = _diffuse(values, normals)
     else:
         seen = along(values, normals)
-    seen = np.broadcast_to(seen, (*seen.shape[:2], 3))
     inside = covered == 1
-    if exposure is None:
-        exposure = float(auto_exposure(jnp.asarray(seen), jnp.asarray(inside)))
-    shown = tone_map(jnp.asarray(seen), exposure, curve=curve, white=white)
-    show_disc(ax, np.asarray(shown), covered)
+    show_disc(ax, tone.colors(seen, inside), covered)
     lowest, largest = seen.min(axis=-1), float(abs(seen[inside]).max(initial=0))
     share = (lowest < 0)[inside].sum() / max(inside.sum(), 1)
-    across = (np.arange(resolution) + 0.5) * 2 / resolution - 1
+    across = centers(resolution)
     mark_negative(
         ax,
         across,
@@ -121,9 +114,8 @@ def _half_way(place: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
 
 def _diffuse(light, normals: Float[np.ndarray, "n n 3"]) -> Float[np.ndarray, "n n c"]:
     if light.ndim == 3:
-        degree = min(
-            _EXACT, (min(light.shape[:2]) - 1) // 2
-        )  # of a small picture, as far as it has
+        # Of a small picture as far as it has.
+        degree = min(_EXACT, (min(light.shape[:2]) - 1) // 2)
         light = np.asarray(project_lat_long(jnp.asarray(light), degree))
     flat = jnp.asarray(normals.reshape(-1, 3).astype(light.dtype))
     values = np.asarray(irradiance(jnp.asarray(light), flat)) / np.pi

@@ -15,8 +15,8 @@ from ..geometry import Mesh, ray_scene
 from ..harmonics import degree_of, evaluate_with_gradient
 from ..imaging import Raster
 from ._axes import length_bar
-from ._colors import NEGATIVE, POSITIVE
-from ._disc import AXES, Frame
+from ._colors import NEGATIVE, POSITIVE, rgba
+from ._disc import AXES, Frame, centers
 from ._surface import Surface, relieved
 
 RELIEF = 0.6  # how dark a balloon's edge is: it has no other shading
@@ -85,8 +85,7 @@ def draw_balloon(
 ) -> None:
     """Draw a balloon of at most unit radius, seen from far away, with axes and its scale."""
     surface = _from_afar(mesh, viewer, resolution)
-    shown = relieved(srgb.encode(surface.pixels(colors)), surface.facing, RELIEF)
-    picture = np.concatenate([np.clip(shown, 0, 1), surface.alpha[..., None]], axis=-1)
+    picture = seen_balloons(surface, colors)
     for name in ("+x", "+y", "+z"):
         x, y, _ = viewer.place(AXES[name])
         ax.plot([0, x], [0, y], color="0.6", linewidth=0.8, zorder=-1)
@@ -107,10 +106,16 @@ def draw_balloon(
         length_bar(ax, 1 / largest, said, unit)
 
 
+def seen_balloons(surface: Surface, colors: Float[np.ndarray, "d 3"]) -> Float[np.ndarray, "h w 4"]:
+    """Make a picture of balloons, encoded, from linear colors at their vertices."""
+    shown = srgb.encode(surface.pixels(colors))
+    return rgba(relieved(shown, surface.facing, RELIEF), surface.alpha)
+
+
 def _from_afar(mesh: Mesh, viewer: Frame, resolution: int) -> Surface:
     """Cast parallel rays, as one who looks from far away sees."""
     count = _SAMPLES * resolution
-    middle = _HALF * ((np.arange(count) + 0.5) * 2 / count - 1)
+    middle = _HALF * centers(count)
     x, y = np.meshgrid(middle, -middle)
     plane = np.stack([x, y, np.full_like(x, 2.0)], axis=-1).reshape(-1, 3)
     origins = (plane @ np.stack(viewer)).astype(np.float32)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import Formatter, MaxNLocator
 
 from .._core.checks import check_flag, check_type
 from ..harmonics import degree_of, degrees, orders
@@ -100,7 +100,7 @@ def _draw(ax: Axes, function, degree: int, scale, numbers: bool) -> None:
         ax.plot(x.T, y.T, color="0.7", linewidth=0.5)
     if numbers:
         for l, m, value in zip(rows, columns - degree, function, strict=True):
-            said = f"{value:.2g}".replace("-", "−")
+            said = Formatter.fix_minus(f"{value:.2g}")
             color = text_on(scale.colors(np.asarray(value)))
             ax.text(m, l, said, ha="center", va="center", color=color, fontsize="small")
     ax.set(xlim=(-degree - 0.55, degree + 0.55), ylim=(degree + 0.55, -0.55))

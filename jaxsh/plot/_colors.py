@@ -11,6 +11,7 @@ from jaxtyping import Float
 from matplotlib.colors import Colormap, LogNorm, Normalize
 
 from .._core.checks import check_number, described
+from .._core.srgb import LUMINANCE
 
 POSITIVE = "#e07b39"
 NEGATIVE = "#3b7dd8"
@@ -81,8 +82,15 @@ def text_on(color: Float[np.ndarray, " 3"]) -> str:
     return "black" if float(np.dot(color, (0.299, 0.587, 0.114))) > 0.5 else "white"
 
 
+def rgba(
+    colors: Float[np.ndarray, "*shape 3"], alpha: Float[np.ndarray, "*shape"]
+) -> Float[np.ndarray, "*shape 4"]:
+    """Put encoded colors, clipped, and their alpha together."""
+    return np.concatenate([np.clip(colors, 0, 1), alpha[..., None]], axis=-1)
+
+
 def luminance(radiance: Float[np.ndarray, "*shape c"]) -> Float[np.ndarray, "*shape"]:
     """Take the luminance of linear sRGB (Rec. 709); of one channel the channel."""
     if radiance.shape[-1] == 1:
         return radiance[..., 0]
-    return radiance @ np.array([0.2126, 0.7152, 0.0722], radiance.dtype)
+    return radiance @ np.array(LUMINANCE, radiance.dtype)

@@ -10,7 +10,9 @@ from matplotlib.patheffects import withStroke
 
 from .._core.checks import described
 from ._arrays import read
+from ._colors import rgba
 
+OUTLINE = [withStroke(linewidth=2, foreground="0.2")]  # of white text on any color
 Number = float | int
 Toward = tuple[Number, Number, Number] | np.ndarray | Array
 AXES = {
@@ -46,21 +48,30 @@ def frame(toward: Any) -> Frame:
     return Frame(right, np.cross(vector, right), vector)
 
 
+def centers(resolution: int) -> Float[np.ndarray, " n"]:
+    """Compute where pixels are between -1 and 1."""
+    return (np.arange(resolution) + 0.5) * 2 / resolution - 1
+
+
+def pixels(resolution: int) -> tuple[Float[np.ndarray, "n n"], ...]:
+    """Compute x, y and radius of the pixels around the unit disc, and the share of each in it."""
+    x, y = np.meshgrid(centers(resolution), -centers(resolution))
+    radius = np.hypot(x, y)
+    return x, y, radius, np.clip((1 - radius) * resolution / 2 + 0.5, 0, 1)
+
+
 def disc(resolution: int) -> tuple[Float[np.ndarray, "n n 3"], Float[np.ndarray, "n n"]]:
     """Compute the near half's normals, to who looks at it, and the share of pixels in it."""
-    middle = (np.arange(resolution) + 0.5) * 2 / resolution - 1
-    x, y = np.meshgrid(middle, -middle)
-    radius = np.hypot(x, y)
+    x, y, radius, covered = pixels(resolution)
     # Beside the disc the normals of its rim, so that half a pixel there has a color.
     inside = np.maximum(radius, 1)
     z = np.sqrt(np.maximum(1 - radius**2, 0))
-    covered = np.clip((1 - radius) * resolution / 2 + 0.5, 0, 1)
     return np.stack([x / inside, y / inside, z], axis=-1), covered
 
 
 def show_disc(ax: Axes, colors: Float[np.ndarray, "n n 3"], covered, extent=(-1, 1, -1, 1)) -> None:
     ax.imshow(
-        np.concatenate([np.clip(colors, 0, 1), covered[..., None]], axis=-1),
+        rgba(colors, covered),
         extent=extent,
         aspect="equal",
         origin="upper",
@@ -80,4 +91,4 @@ def name_axes(ax: Axes, places: dict[str, Float[np.ndarray, " 3"]]) -> None:
         out = 1.1 / radius if beside else 1.0
         text = ax.text(x * out, y * out, name, ha="center", va="center", fontsize="small")
         if not beside:
-            text.set(color="white", path_effects=[withStroke(linewidth=2, foreground="0.2")])
+            text.set(color="white", path_effects=OUTLINE)

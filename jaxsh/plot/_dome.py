@@ -5,20 +5,18 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 import jax.numpy as jnp
-import matplotlib
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
-from matplotlib.patheffects import withStroke
 
-from .._core.checks import check_choice, check_flag, check_number, check_size, check_type
-from ..imaging import auto_exposure, tone_map
+from .._core.checks import check_choice, check_flag, check_size, check_type
 from ._arrays import read
 from ._axes import color_bar, flat_axes
 from ._colors import color_scale, luminance
-from ._disc import show_disc
+from ._disc import OUTLINE, pixels, show_disc
 from ._radiance import along, read_light
+from ._tone import Curve, read_tone
 
 Projection = Literal["equal-area", "equidistant"]
 _RINGS = (30, 60)  # degrees above the horizon
@@ -34,7 +32,7 @@ def dome(
     limits: float | tuple[float, float] | None = None,
     log: bool = False,
     exposure: float | None = None,
-    curve: Literal["clip", "reinhard"] = "clip",
+    curve: Curve = "clip",
     white: float = math.inf,
     resolution: int = 256,
     colorbar: bool = True,
@@ -75,12 +73,9 @@ def dome(
     "luminance / zenith's"
     """
     check_choice("projection", projection, ("equal-area", "equidistant"))
-    check_choice("curve", curve, ("clip", "reinhard"))
+    tone = read_tone(exposure, curve, white)
     log, colorbar = check_flag("log", log), check_flag("colorbar", colorbar)
-    white = check_number("white", white, above=0.0, infinite=True)
     resolution = check_size("resolution", resolution)
-    if exposure is not None:
-        exposure = check_number("exposure", exposure, least=0.0)
     if label is not None:
         check_type("label", label, str)
     elif limits is not None or log:
@@ -92,11 +87,7 @@ def dome(
     seen = _radiance(sky, directions)
     ax = flat_axes(ax, (4.6, 4.0) if label else (4.0, 4.0))
     if label is None:
-        seen = np.broadcast_to(seen, (*seen.shape[:2], 3))
-        if exposure is None:
-            exposure = float(auto_exposure(jnp.asarray(seen), jnp.asarray(covered == 1)))
-        shown = np.asarray(tone_map(jnp.asarray(seen), exposure, curve=curve, white=white))
-        show_disc(ax, shown, covered)
+        show_disc(ax, tone.colors(seen, covered == 1), covered)
     else:
         values = luminance(seen)
         scale = color_scale(values[covered > 0], limits, log)
@@ -115,14 +106,11 @@ def dome(
 
 def _map(resolution: int, projection: str) -> tuple[np.ndarray, np.ndarray]:
     """Compute directions of the pixels, beside the disc those of its rim, and shares in it."""
-    middle = (np.arange(resolution) + 0.5) * 2 / resolution - 1
-    x, y = np.meshgrid(middle, -middle)
-    radius = np.hypot(x, y)
+    x, y, radius, covered = pixels(resolution)
     inside = np.minimum(radius, 1)
     theta = 2 * np.arcsin(inside / np.sqrt(2)) if projection == "equal-area" else inside * np.pi / 2
     z = np.maximum(np.cos(theta), _ABOVE)
     across = np.sqrt(1 - z * z) / np.where(radius > 0, radius, 1)
-    covered = np.clip((1 - radius) * resolution / 2 + 0.5, 0, 1)
     return np.stack([x * across, y * across, z], axis=-1), covered
 
 
@@ -151,7 +139,6 @@ def _draw_frame(ax: Axes, projection: str) -> None:
         e = math.radians(degrees)
         x, _ = _place(np.array([math.cos(e), 0, math.sin(e)]), projection)
         ax.add_patch(Circle((0, 0), x, fill=False, ec="0.7", lw=0.7, ls=":"))
-        outline = [withStroke(linewidth=2, foreground="0.2")]
         ax.text(
             0.7071 * x,
             -0.7071 * x,
@@ -160,16 +147,8 @@ def _draw_frame(ax: Axes, projection: str) -> None:
             fontsize="x-small",
             ha="center",
             va="center",
-            path_effects=outline,
+            path_effects=OUTLINE,
         )
     for name, place in {"+x": (1, 0), "+y": (0, 1), "−x": (-1, 0), "−y": (0, -1)}.items():
-        color = matplotlib.rcParams["text.color"]
-        ax.text(
-            1.09 * place[0],
-            1.09 * place[1],
-            name,
-            ha="center",
-            va="center",
-            fontsize="small",
-            color=color,
-        )
+        x, y = 1.09 * place[0], 1.09 * place[1]
+        ax.text(x, y, name, ha="center", va="center", fontsize="small")

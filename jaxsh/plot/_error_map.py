@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
+from matplotlib.ticker import Formatter
 
 from .._core.checks import check_flag, check_type
 from ._arrays import read
@@ -93,7 +94,7 @@ def _draw_numbers(ax: Axes, values, x, y, scale) -> None:
     colors = scale.colors(values)
     for (i, j), value in np.ndenumerate(values):
         color = text_on(colors[i, j])
-        said = f"{value:.3g}".replace("-", "−")
+        said = Formatter.fix_minus(f"{value:.3g}")
         ax.text(j, i, said, ha="center", va="center", color=color, fontsize="small")
     ax.set_xticks(range(len(x)), [f"{one:g}" for one in x])
     ax.set_yticks(range(len(y)), [f"{one:g}" for one in y])

@@ -36,7 +36,8 @@ def gradients(
     """Draw gradients of light at points as arrows in a plane: they point where light grows.
 
     Arrows show the two components in the plane, and their length is on one scale, which the arrow
-    above the picture tells. Their points carry the light itself in false color where it is given.
+    above the picture tells; those shorter than a tenth of the longest are left out. The points
+    carry the light itself in false color where it is given.
     For the gradient of a light's mean radiance over all directions, take that of its first
     coefficient times √(1/4π): `light[:, :, 0].mean(1) / np.sqrt(4 * np.pi)`.
 

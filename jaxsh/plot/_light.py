@@ -1,19 +1,18 @@
 """A light as a lat-long picture."""
 
 import math
-from typing import Literal
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
 
-from .._core.checks import check_choice, check_number, check_size
-from ..imaging import auto_exposure, tone_map
+from .._core.checks import check_size
 from ..sphere import reconstruct_lat_long
 from ._axes import flat_axes
 from ._negative import mark_negative
 from ._radiance import read_light
+from ._tone import Curve, read_tone
 
 
 def light(
@@ -21,7 +20,7 @@ def light(
     *,
     height: int = 128,
     exposure: float | None = None,
-    curve: Literal["clip", "reinhard"] = "clip",
+    curve: Curve = "clip",
     white: float = math.inf,
     ax: Axes | None = None,
 ) -> Axes:
@@ -56,21 +55,12 @@ def light(
     >>> ax.get_legend().get_texts()[0].get_text()
     'negative: 40 % of the sphere, down to −1.2'
     """
-    ax = None if ax is None else flat_axes(ax, (7.0, 4.0))
     height = check_size("height", height)
-    check_choice("curve", curve, ("clip", "reinhard"))
-    white = check_number("white", white, above=0.0, infinite=True)
-    if exposure is not None:
-        exposure = check_number("exposure", exposure, least=0.0)
+    tone = read_tone(exposure, curve, white)
     picture = _picture(light, height)
-    shown = jnp.asarray(picture)
-    if exposure is None:
-        exposure = float(auto_exposure(shown))
-    colors = jnp.broadcast_to(shown, (*shown.shape[:2], 3))
-    encoded = np.asarray(tone_map(colors, exposure, curve=curve, white=white))
     ax = flat_axes(ax, (7.0, 4.0))
     ax.imshow(
-        encoded,
+        tone.colors(picture),
         extent=(0, 360, 180, 0),
         aspect="equal",
         origin="upper",

@@ -1,19 +1,18 @@
 """A mesh with radiance at its vertices."""
 
 import math
-from typing import Literal
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
 
-from .._core.checks import check_choice, check_number, check_type
+from .._core.checks import check_type
 from ..geometry import Mesh
-from ..imaging import Camera, auto_exposure, tone_map
+from ..imaging import Camera
 from ._arrays import read
 from ._negative import mark_negative
 from ._surface import see
+from ._tone import Curve, read_tone
 
 
 def shaded(
@@ -22,7 +21,7 @@ def shaded(
     *,
     camera: Camera | None = None,
     exposure: float | None = None,
-    curve: Literal["clip", "reinhard"] = "clip",
+    curve: Curve = "clip",
     white: float = math.inf,
     length: str = "mesh units",
     ax: Axes | None = None,
@@ -62,10 +61,7 @@ def shaded(
     """
     check_type("mesh", mesh, Mesh)
     check_type("length", length, str)
-    check_choice("curve", curve, ("clip", "reinhard"))
-    white = check_number("white", white, above=0.0, infinite=True)
-    if exposure is not None:
-        exposure = check_number("exposure", exposure, least=0.0)
+    tone = read_tone(exposure, curve, white)
     values = read("radiance", radiance)
     if values.ndim != 2 or values.shape[0] != len(mesh.vertices) or values.shape[1] not in (1, 3):
         raise ValueError(
@@ -73,11 +69,9 @@ def shaded(
             f"vertex, got shape {values.shape}"
         )
     surface = see(mesh, camera)
-    picture = surface.pixels(np.broadcast_to(values, (len(values), 3)))
-    if exposure is None:
-        exposure = float(auto_exposure(jnp.asarray(picture), surface.raster.mask))
-    shown = tone_map(jnp.asarray(picture), exposure, curve=curve, white=white)
-    ax = surface.show(np.asarray(shown), ax, length)
+    picture = surface.pixels(values)
+    shown = tone.colors(picture, np.asarray(surface.raster.mask))
+    ax = surface.show(shown, ax, length)
     height, width = surface.alpha.shape
     lowest = np.where(surface.alpha == 1, picture.min(axis=-1), np.inf)
     share = (lowest < 0).sum() / max((surface.alpha == 1).sum(), 1)

@@ -12,6 +12,7 @@ from .._core.checks import check_type
 from ..geometry import Mesh
 from ..imaging import Camera, Raster, interpolate, rasterize
 from ._axes import flat_axes, length_bar
+from ._colors import rgba
 
 _SIZE = 480  # pixels of a picture whose camera is not said
 SAMPLES = 2
@@ -50,7 +51,7 @@ class Surface(NamedTuple):
         wide, high = box[1] - box[0], box[2] - box[3]
         scale = 4.5 / max(wide, high)
         ax = flat_axes(ax, (scale * wide + 0.8, scale * high + 0.5))
-        picture = np.concatenate([np.clip(colors, 0, 1), self.alpha[..., None]], axis=-1)
+        picture = rgba(colors, self.alpha)
         for layer in (picture,) if over is None else (picture, over):
             ax.imshow(layer, extent=(0, width, height, 0), aspect="equal", origin="upper")
         ax.set(xlim=box[:2], ylim=box[2:])

@@ -7,14 +7,13 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 from matplotlib.axes import Axes
 
-from .._core import srgb
 from .._core.checks import as_host_integer, check_number, check_size, check_type
 from ..geometry import Mesh
 from ..harmonics import degree_of
 from ..imaging import Camera, rasterize
 from ._arrays import read_coefficients
 from ._axes import length_bar
-from ._balloon import RELIEF, Balloons, balloons, sign_colors
+from ._balloon import RELIEF, Balloons, balloons, seen_balloons, sign_colors
 from ._surface import SAMPLES, Surface, camera_for, facing_of, relieved, see
 
 _STEPS = 24  # from pole to pole: lobes are small in the picture
@@ -150,6 +149,4 @@ def _in_front(
 ) -> Float[np.ndarray, "h w 4"]:
     view = camera_for(mesh, camera, _MARGIN)
     raster = rasterize(balloons, view, samples=SAMPLES)
-    surface = facing_of(balloons, view, raster)
-    shown = relieved(srgb.encode(surface.pixels(colors)), surface.facing, RELIEF)
-    return np.concatenate([np.clip(shown, 0, 1), surface.alpha[..., None]], axis=-1)
+    return seen_balloons(facing_of(balloons, view, raster), colors)

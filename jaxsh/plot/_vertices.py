@@ -8,7 +8,6 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import ArrayLike, Bool, Float, Integer
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap, to_rgb
 from matplotlib.patches import Patch
 
@@ -18,7 +17,7 @@ from ..geometry import Mesh
 from ..imaging import Camera
 from ._arrays import check_labels, read
 from ._axes import color_bar
-from ._colors import NEGATIVE, POSITIVE, color_scale
+from ._colors import NEGATIVE, POSITIVE, ColorScale, color_scale
 from ._surface import relieved, see
 
 _MOST = 24  # kinds that colors still tell apart
@@ -145,8 +144,6 @@ def _key(ax: Axes, palette, said: list[str], label: str, *, legend: bool) -> Non
         )
         return
     norm = BoundaryNorm(np.arange(len(said) + 1) - 0.5, len(said))
-    bar = ax.figure.colorbar(
-        ScalarMappable(norm, ListedColormap(palette)), ax=ax, label=label, fraction=0.046, pad=0.03
-    )
+    bar = color_bar(ax, ColorScale(norm, ListedColormap(palette), "neither"), label)
     bar.set_ticks(list(range(len(said))), labels=said)
     bar.ax.tick_params(length=0, which="both")
