@@ -1,4 +1,4 @@
-"""From radiance to what a screen shows, for pictures in a light's own colors."""
+"""Radiance as a screen shows it, for pictures in a light's own colors."""
 
 from typing import Literal, NamedTuple
 

@@ -42,7 +42,7 @@ def rms(a, b):
 
 
 @pytest.mark.parametrize(
-    # Of 256 colors; of 4:2:0 and quantization.
+    # Of 256 colors, 0.0226 measured; of 4:2:0 and quantization, 0.0129.
     ("suffix", "tolerance"),
     [(".gif", 0.025), (".webp", 0.015), (".WEBP", 0.015)],
 )
@@ -69,11 +69,11 @@ def test_mp4_comes_back(tmp_path):
         assert fact in said
     found = np.frombuffer(run.stdout, np.uint8).reshape(-1, 32, 48, 3) / 255
     assert found.shape == frames.shape
-    assert rms(found, frames) < 0.02
+    assert rms(found, frames) < 0.02  # 0.0174 measured
     assert [file.name for file in path.parent.iterdir()] == ["a.mp4"]
 
 
-@pytest.mark.parametrize(("suffix", "tolerance"), [(".gif", 0), (".webp", 0.03)])
+@pytest.mark.parametrize(("suffix", "tolerance"), [(".gif", 0), (".webp", 0.02)])
 def test_gray_and_codes(tmp_path, suffix, tolerance):
     gray = np.stack([np.tile(np.linspace(0, start, 40), (30, 1)) for start in (0.4, 0.7, 1.0)])
     codes = np.rint(gray * 255).astype(np.uint8)
@@ -86,7 +86,7 @@ def test_gray_and_codes(tmp_path, suffix, tolerance):
     )
     np.testing.assert_array_equal(floats, whole)
     np.testing.assert_array_equal(floats, wide)
-    np.testing.assert_allclose(floats[..., 0], codes / 255, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(floats[..., 0], codes / 255, rtol=0, atol=tolerance)  # 0.012
 
 
 @pytest.mark.parametrize(("suffix", "unit"), [(".gif", 10), (".webp", 1)])
@@ -178,7 +178,6 @@ def test_bad_movies_are_refused(unchecked, tmp_path, name, frames, options, mess
 
 @needs_ffmpeg
 def test_ffmpeg_takes_names_as_files(tmp_path, monkeypatch):
-    pytest.importorskip("imageio_ffmpeg")
     monkeypatch.chdir(tmp_path)
     for name in ("-y.mp4", "at:10.mp4"):
         assert write_movie(name, sweep(2)).stat().st_size > 500

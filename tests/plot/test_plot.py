@@ -26,8 +26,9 @@ def test_light_shows_the_function_at_its_directions(rng, dtype, array):
     directions = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
     radiance = np.asarray(harmonics.evaluate(directions, 2)) @ coefficients.T
     expected = 255 * np.asarray(imaging.tone_map(jnp.asarray(radiance), 0.7))
-    # Half a pixel of a picture of 128 rows: the function changes by less than two steps of 255.
-    np.testing.assert_allclose(at(ax, np.stack([phi, theta], axis=-1)), expected, rtol=0, atol=3)
+    # Half a pixel of a picture of 128 rows: the function changes by less than two steps of 255
+    # there; 1.2 measured.
+    np.testing.assert_allclose(at(ax, np.stack([phi, theta], axis=-1)), expected, rtol=0, atol=2)
     assert ax.get_legend() is None
     assert not near(pixels(ax.figure), MAGENTA).any()
 

@@ -63,7 +63,8 @@ def test_against_a_short_formula(rng):
     latitudes, longitudes = rng.uniform(-90, 90, (3, 1)), rng.uniform(-180, 360, (3, 1))
     found = sky.sun_direction(times, latitudes, longitudes)
     assert found.shape == (3, 200, 3)
-    assert degrees_between(found, almanac_sun(times, latitudes, longitudes)).max() < 0.015
+    apart = degrees_between(found, almanac_sun(times, latitudes, longitudes))
+    assert apart.max() < 0.015  # 0.012 measured
     np.testing.assert_allclose(np.linalg.norm(found, axis=-1), 1, rtol=0, atol=1e-15)
 
 
@@ -78,7 +79,7 @@ def test_air_lifts_the_sun(rng):
     expected = 1.02 / np.tan(np.radians(altitude + 10.3 / (altitude + 5.11))) / 60
     expected *= 1013.25 / 1010 * 283 / (273 + 12)
     up = altitude > 0
-    np.testing.assert_allclose((lifted - altitude)[up], expected[up], rtol=0, atol=6e-3)
+    np.testing.assert_allclose((lifted - altitude)[up], expected[up], rtol=0, atol=6e-3)  # 4e-3
     # Straight up, and along the same azimuth.
     east, north = np.moveaxis(np.stack([straight[up, :2], seen[up, :2]]), -1, 0)
     np.testing.assert_allclose(east[0] * north[1], east[1] * north[0], rtol=0, atol=1e-7)
