@@ -1,0 +1,87 @@
+"""On a GPU or TPU no loop remains that only a CPU's cache wants, and nothing calls the host.
+
+No such device is needed: JAX lowers for one that is not here. The table is `tests/lowered`.
+"""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import lowered
+import lowered.loops
+import pytest
+import valid_calls
+
+PLATFORMS = ("cuda", "tpu")
+
+
+@functools.cache
+def traced(module: str, name: str) -> jax.stages.Traced:
+    """A call of the table, with its derivative in reverse mode, traced for no platform yet."""
+    call = lowered.table(module)[name]
+
+    def both(*arguments):
+        result = call.function(*arguments)
+        floats = [leaf for leaf in jax.tree.leaves(arguments) if is_float(leaf)]
+        return result, jax.grad(functools.partial(size, call, arguments))(floats)
+
+    return jax.jit(both if call.reverse else call.function).trace(*call.arguments)
+
+
+def size(call, arguments, floats):
+    """The sum of squares of all floats in a result, which makes reverse mode start everywhere."""
+    leaves, tree = jax.tree.flatten(arguments)
+    new = iter(floats)
+    leaves = [next(new) if is_float(leaf) else leaf for leaf in leaves]
+    result = call.function(*jax.tree.unflatten(tree, leaves))
+    return sum(jnp.sum(leaf**2) for leaf in jax.tree.leaves(result) if is_float(leaf))
+
+
+def is_float(leaf) -> bool:
+    return hasattr(leaf, "dtype") and jnp.issubdtype(leaf.dtype, jnp.floating)
+
+
+def faults(module: str, name: str, platform: str) -> list[str]:
+    """What a call has on a platform and should not."""
+    call = lowered.table(module)[name]
+    program = lowered.loops.lowered(traced(module, name), platform)
+    found = [f"calls the host: {callback}" for callback in program.callbacks]
+    if program.trips > call.trips:
+        found.append(f"{program.trips} trips instead of {call.trips}: {program.nests}")
+    if program.open > call.open:
+        found.append(f"{program.open} loops without a number of trips instead of {call.open}")
+    return [f"{module}.{name} on {platform}: {fault}" for fault in found]
+
+
+@pytest.mark.parametrize("module", lowered.MODULES)
+def test_a_public_function_of_arrays_that_is_not_lowered_fails(module):
+    valid = valid_calls.table(module)
+    listed = lowered.table(module).keys() | lowered.without(module).keys()
+    traceable = {name for name, call in valid.items() if not call.host or call.slow}
+    of_arrays = {name for name in traceable if any(map(has_floats, valid[name].arguments.values()))}
+    assert of_arrays - listed == set()
+    assert listed <= valid.keys()
+    assert lowered.table(module).keys().isdisjoint(lowered.without(module))
+
+
+def has_floats(value) -> bool:
+    return any(map(is_float, jax.tree.leaves(value)))
+
+
+@pytest.mark.parametrize("module", lowered.MODULES)
+def test_more_loops_than_two_trips_have_a_reason(module):
+    for name, call in lowered.table(module).items():
+        assert bool(call.why) == (call.trips > 2 or call.open > 0), name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("platform", PLATFORMS)
+@pytest.mark.parametrize("module", lowered.MODULES)
+def test_no_loop_but_those_of_the_table_is_left(module, platform):
+    found = [fault for name in lowered.table(module) for fault in faults(module, name, platform)]
+    assert not found, "\n" + "\n".join(found)
+
+
+@pytest.mark.parametrize(("module", "name"), [("harmonics", "evaluate")])
+def test_no_loop_is_left_in_some(module, name):
+    assert not [fault for p in PLATFORMS for fault in faults(module, name, p)]
