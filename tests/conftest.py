@@ -54,15 +54,14 @@ def unchecked():
 def pytest_generate_tests(metafunc):
     """Tries what calls `check_sharded` on one kind of mesh a test; two of the three are slow."""
     if "check_sharded" in metafunc.function.__code__.co_names:
-        metafunc.fixturenames.append("kind_of_mesh")
         slow = [pytest.param(kind, marks=pytest.mark.slow) for kind in sharding.kinds[1:]]
         metafunc.parametrize("kind_of_mesh", [sharding.kinds[0], *slow], indirect=True)
 
 
-@pytest.fixture
-def kind_of_mesh(request, monkeypatch):
+@pytest.fixture(autouse=True)  # a fixture that a hook asks for is not set up
+def kind_of_mesh(request):
     """The one kind of mesh that `check_sharded` tries in this test."""
-    monkeypatch.setattr(sharding, "kinds", (request.param,))
+    sharding.kinds = (request.param,) if hasattr(request, "param") else sharding.KINDS
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,7 @@
 """What every public function of arrays promises on a mesh of devices."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import jax
@@ -12,8 +13,18 @@ ROWS = P("rows")  # for an array whose leading axis is shared out; P(None, "rows
 WHOLE = P()  # for one that each device holds in full
 
 Kind = Literal["explicit", "auto", "shard_map"]
-# The kinds that `check_sharded` tries; set by the fixture `kind_of_mesh`, one for each test.
-kinds: tuple[Kind, ...] = ("explicit", "auto", "shard_map")
+KINDS: tuple[Kind, ...] = ("explicit", "auto", "shard_map")
+kinds = KINDS  # those that `check_sharded` tries; one a test, by the fixture `kind_of_mesh`
+
+_COLLECTIVE = re.compile(
+    r" ((?:ragged-)?all-(?:gather|reduce|to-all)|reduce-scatter|collective-[a-z]+)(?:-start)?\("
+)
+
+
+def collectives(text: str) -> dict[str, str]:
+    """What devices exchange in a compiled program: a line of it for each kind."""
+    lines = ((_COLLECTIVE.search(line), line.strip()) for line in text.splitlines())
+    return {found[1]: line for found, line in lines if found}
 
 
 def check_sharded(
@@ -24,15 +35,16 @@ def check_sharded(
     *,
     rtol: float = 1e-5,
     mapped: Callable[..., Any] | bool = True,
+    exchange: Mapping[str, str] | None = None,
 ) -> None:
-    """Runs `function` on two devices: the same numbers, sharded as `out` says, nothing gathered.
+    """Runs `function` on two devices: the same numbers, sharded as `out` says, nothing exchanged.
 
     `specs` and `out` are prefix pytrees of PartitionSpecs, one for each argument and for the
     result. Arguments that are not arrays (Python numbers, strings, None) belong into `function`.
     It is tried with explicit axes, with automatic ones and inside `shard_map` (the last two in the
     slow tests). Inside, each device has its own rows only, so that a sum over them needs its
     `psum`: `mapped` is the function with it, True for the function itself, or False for what makes
-    no sense there.
+    no sense there. `exchange` names the collectives that the algorithm needs, and why.
     """
     plain = jax.jit(function)(*arguments)
     for kind in kinds:
@@ -52,8 +64,8 @@ def check_sharded(
         result = compiled(*placed)
         _check_placed(result, _shardings(mesh, out, result), kind)
         _check_close(result, plain, rtol, kind)
-        gathered = [line for line in compiled.as_text().splitlines() if " all-gather" in line]
-        assert not gathered, f"{kind} axes: {gathered[0].strip()}"
+        found = collectives(compiled.as_text())
+        assert found.keys() == set(exchange or ()), f"{kind} axes: {list(found.values())}"
 
 
 def _shardings(mesh, spec, tree):

@@ -3,6 +3,8 @@
 The quadratures make constants, from nothing that could be sharded.
 """
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import pytest
@@ -13,6 +15,7 @@ from jaxsh import sphere
 
 SECOND = P(None, "rows")
 COUNT = 8
+SUM = {"all-reduce": "each device sums its own directions, and all sums are added"}
 
 
 def summed(function):
@@ -30,7 +33,7 @@ def test_samples_over_directions(count, rng):
     values, weights = rng.normal(size=(2, count)), rng.uniform(1, 2, count)
     samples = values, rng.normal(size=(count, 3)), weights
     specs = SECOND, ROWS, ROWS
-    check_sharded(project, samples, specs, WHOLE, mapped=summed(project))
+    check_sharded(project, samples, specs, WHOLE, mapped=summed(project), exchange=SUM)
 
 
 def test_samples_of_many_functions(rng):
@@ -102,9 +105,8 @@ def test_pictures(rng):
     c = rng.normal(size=(2, 9))
     check_sharded(channels, (image, c), (P(None, None, "rows"), ROWS), ROWS)
     for spec in (ROWS, SECOND):
-        check_sharded(
-            lambda image: sphere.project_lat_long(image, 2), (image,), (spec,), WHOLE, mapped=False
-        )
+        project = functools.partial(sphere.project_lat_long, degree=2)
+        check_sharded(project, (image,), (spec,), WHOLE, mapped=False, exchange=SUM)
 
 
 def test_no_loop_off_the_cpu():
