@@ -1,19 +1,25 @@
 """Every public function of arrays at full size: a table to lower for devices that are not here.
 
-`calls()` of each module gives them by the names of `valid_calls`; `WITHOUT` says why a function of
-that table is not here. All that runs on the host there needs no reason here.
+`calls()` of each module gives them by the names of `valid_calls`, the same function on something
+else after a comma; `WITHOUT` says why a function of that table is not here. What is marked there as
+running on the host needs no reason.
 """
 
 import functools
 import types
 
-from . import harmonics
+from . import geometry, harmonics, imaging, sky, sphere, transfer
 from .shared import DEGREE, Call, K, V
 
 __all__ = ["DEGREE", "MODULES", "K", "V", "table", "without"]
 
 MODULES: dict[str, types.ModuleType] = {
+    "geometry": geometry,
     "harmonics": harmonics,
+    "imaging": imaging,
+    "sky": sky,
+    "sphere": sphere,
+    "transfer": transfer,
 }
 
 
