@@ -18,6 +18,8 @@ from jaxsh.geometry import (
     vertex_normals,
 )
 from jaxsh.transfer import bake
+from jaxsh.transfer._bake import _origins
+from jaxsh.transfer._bake._receivers import unit_normals
 
 DEGREE, RAYS = 4, 256  # of all bakes here: each other pair compiles anew
 
@@ -233,3 +235,16 @@ def test_ray_bias_and_offset_exclude_each_other(unchecked):
     for wrong in (0, -1.0, np.nan, np.inf):
         with pytest.raises(ValueError, match=r"offset must be (a number > 0|finite)"):
             bake(bodies.cube(), 1, offset=wrong)
+
+
+def test_origins_do_not_depend_on_the_blocks_they_are_made_in(monkeypatch):
+    """A mesh with a rim, gaps and shadows, cut in blocks that divide nothing."""
+    whole = knot(3000)
+    mesh = Mesh(whole.vertices, whole.faces[: len(whole.faces) * 9 // 10], whole.normals)
+    scene, normals = ray_scene(mesh), unit_normals(mesh)
+    expected = _origins.origins(mesh, normals, scene, None, None)
+    monkeypatch.setattr(_origins, "_BLOCK", 1000)
+    got = _origins.origins(mesh, normals, scene, None, None)
+    np.testing.assert_array_equal(got.positions, expected.positions)
+    np.testing.assert_array_equal(got.distance, expected.distance)
+    np.testing.assert_array_equal(got.least, expected.least)

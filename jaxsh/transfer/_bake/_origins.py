@@ -1,6 +1,7 @@
 """Origins of rays: a little off the surface, by as little as its coordinates allow."""
 
 import warnings
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,8 @@ _OF_EDGE = 1e-3
 _ULPS = 4
 _LOUD = 0.1  # of a vertex's shortest edge; warned of where half of the vertices have more
 _SINGLE = float(np.finfo(np.float32).eps)
+# Faces or vertices in a block: what is made on the way is as large as a block, not as the mesh.
+_BLOCK = 2**18
 
 
 class Origins(NamedTuple):
@@ -53,19 +56,27 @@ def origins(
     _warn_of_large(distance, shortest, least, vertices)
 
     rim = _open(faces, len(vertices))
-    inwards = _inwards(vertices, faces, rim)
-    positions = vertices.astype(np.float64)
+    inwards, every = _inwards(vertices, faces, rim), np.arange(len(vertices))
 
     def lifted(by: Float[np.ndarray, " n"], at: slice | Int[np.ndarray, " n"]) -> np.ndarray:
-        start = positions[at] + by[:, None] * normals[at]
-        aside = np.minimum(by, shortest[at] / 10)
+        start = vertices[at].astype(np.float64)
+        start += by[:, None] * normals[at]
         edge = rim[at]
-        start[edge] += aside[edge, None] * inwards[at][edge]
+        if edge.any():
+            aside = np.minimum(by, shortest[at] / 10)[edge, None]
+            start[edge] += aside * inwards.of(every[at][edge])
         return start.astype(np.promote_types(vertices.dtype, np.float32))
 
-    if automatic:
-        distance = _within_gaps(scene, normals, distance, least, lifted)
-    return Origins(lifted(distance, slice(None)), distance, least, not automatic)
+    positions = np.empty(vertices.shape, np.promote_types(vertices.dtype, np.float32))
+    for part in _blocks(len(vertices)):
+        if automatic:
+            distance[part] = _within_gaps(scene, normals, distance, least, lifted, part)
+        positions[part] = lifted(distance[part], part)
+    return Origins(positions, distance, least, not automatic)
+
+
+def _blocks(count: int) -> Iterator[slice]:
+    return (slice(start, min(start + _BLOCK, count)) for start in range(0, count, _BLOCK))
 
 
 def _rounding(
@@ -89,19 +100,17 @@ def _rounding(
     return np.maximum(stored, cast)
 
 
-def _within_gaps(scene: RayScene, normals, distance, least, lifted) -> np.ndarray:
-    """Halve the distance to what lies between a vertex and its origin."""
-    wide = np.flatnonzero((distance > least) & normals.any(axis=1))
-    if not len(wide):
-        return distance
-    start = lifted(least[wide], wide)
-    stopped = scene.occluded(start, normals[wide], distance[wide] - least[wide])
-    if not stopped.any():
-        return distance
-    narrow = wide[stopped]
-    gap = scene.closest_hit(start[stopped], normals[narrow]).distance.astype(np.float64)
-    distance[narrow] = np.minimum(distance[narrow], least[narrow] + gap / 2)
-    return distance
+def _within_gaps(scene: RayScene, normals, distance, least, lifted, part: slice) -> np.ndarray:
+    """Halve the distance to what lies between a vertex and its origin; the distances of a part."""
+    wide = part.start + np.flatnonzero((distance[part] > least[part]) & normals[part].any(axis=1))
+    if len(wide):
+        start = lifted(least[wide], wide)
+        stopped = scene.occluded(start, normals[wide], distance[wide] - least[wide])
+        if stopped.any():
+            narrow = wide[stopped]
+            gap = scene.closest_hit(start[stopped], normals[narrow]).distance.astype(np.float64)
+            distance[narrow] = np.minimum(distance[narrow], least[narrow] + gap / 2)
+    return distance[part]
 
 
 def _warn_of_large(distance, shortest, least, vertices) -> None:
@@ -137,18 +146,19 @@ def _edges(
     # By a power of two of moderate size, so that no square leaves the range of numbers.
     exponent = np.frexp(np.abs(vertices).max())[1]
     points = np.ldexp(np.ascontiguousarray(vertices.T, np.float64), -exponent)
-    corners = [np.take(points, faces[:, corner], axis=1) for corner in range(3)]
-    shortest, longest = np.full(len(faces), np.inf), np.zeros(len(faces))
-    for one, two in ((0, 1), (1, 2), (2, 0)):
-        x, y, z = corners[two] - corners[one]
-        length = np.sqrt(x * x + y * y + z * z)
-        longest = np.maximum(longest, length)
-        length[length == 0] = np.inf
-        shortest = np.minimum(shortest, length)
     least, most = np.full(len(vertices), np.inf), np.zeros(len(vertices))
-    for corner in range(3):
-        np.minimum.at(least, faces[:, corner], shortest)
-        np.maximum.at(most, faces[:, corner], longest)
+    for part in _blocks(len(faces)):
+        corners = [np.take(points, faces[part, corner], axis=1) for corner in range(3)]
+        shortest, longest = np.full(len(corners[0].T), np.inf), np.zeros(len(corners[0].T))
+        for one, two in ((0, 1), (1, 2), (2, 0)):
+            x, y, z = corners[two] - corners[one]
+            length = np.sqrt(x * x + y * y + z * z)
+            longest = np.maximum(longest, length)
+            length[length == 0] = np.inf
+            shortest = np.minimum(shortest, length)
+        for corner in range(3):
+            np.minimum.at(least, faces[part, corner], shortest)
+            np.maximum.at(most, faces[part, corner], longest)
     return np.ldexp(least, exponent), np.ldexp(most, exponent)
 
 
@@ -158,25 +168,36 @@ def _open(faces: Int[np.ndarray, "f 3"], count: int) -> Bool[np.ndarray, " v"]:
     Around a vertex the numbers of next and previous corners cancel but for the ends of its fan;
     numbers are drawn at random, so that those of several fans do not cancel.
     """
-    numbers = np.random.default_rng(0).integers(2**40, size=count).astype(np.float64)
-    ends = np.zeros(count)
-    for corner in range(3):
-        step = numbers[faces[:, corner - 2]] - numbers[faces[:, corner - 1]]
-        ends += np.bincount(faces[:, corner], step, minlength=count)
+    numbers = np.random.default_rng(0).integers(2**40, size=count)
+    ends = np.zeros(count, np.int64)
+    for part in _blocks(len(faces)):
+        for corner in range(3):
+            step = numbers[faces[part, corner - 2]] - numbers[faces[part, corner - 1]]
+            np.add.at(ends, faces[part, corner], step)
     return ends != 0
+
+
+class _Inwards(NamedTuple):
+    """Holds for vertices on a rim the directions into their faces: of unit length, or zero."""
+
+    vertices: Int[np.ndarray, " n"]  # ascending
+    vectors: Float[np.ndarray, "n 3"]
+
+    def of(self, vertices: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 3"]:
+        return self.vectors[np.searchsorted(self.vertices, vertices)]
 
 
 def _inwards(
     vertices: Float[np.ndarray, "v 3"],
     faces: Int[np.ndarray, "f 3"],
     rim: Bool[np.ndarray, " v"],
-) -> Float[np.ndarray, "v 3"]:
+) -> _Inwards:
     """Point from vertices on a rim into their faces: the mean over the fan, at unit length."""
-    total, angle = np.zeros((len(vertices), 3)), np.zeros(len(vertices))
-    faces = faces[rim[faces].any(axis=1)]
-    if not len(faces):
-        return total
-    points = vertices.astype(np.float64)
+    parts = [faces[part] for part in _blocks(len(faces))]
+    faces = np.concatenate([part[rim[part].any(axis=1)] for part in parts] or [faces])
+    used, faces = np.unique(faces, return_inverse=True)
+    faces, points, rim = faces.reshape(-1, 3), vertices[used].astype(np.float64), rim[used]
+    total, angle = np.zeros((len(used), 3)), np.zeros(len(used))
     for corner in range(3):
         at = faces[:, corner]
         sides = [points[faces[:, corner - k]] - points[at] for k in (1, 2)]
@@ -185,11 +206,11 @@ def _inwards(
         width = np.linalg.norm(one - two, axis=1)
         middle = width[:, None] * _unit(one + two)
         for axis in range(3):
-            total[:, axis] += np.bincount(at, middle[:, axis], minlength=len(vertices))
-        angle += np.bincount(at, width, minlength=len(vertices))
+            total[:, axis] += np.bincount(at, middle[:, axis], minlength=len(used))
+        angle += np.bincount(at, width, minlength=len(used))
     # A fan that is nearly whole, as along a slit, has no inside.
     sided = rim & (np.linalg.norm(total, axis=1) > 0.05 * angle)
-    return np.where(sided[:, None], _unit(total), 0)
+    return _Inwards(used, np.where(sided[:, None], _unit(total), 0))
 
 
 def _unit(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
