@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .._core.checks import check_all
+from .._core.checks import check_all, check_size
 from .._core.host import cores
 from ._cast import JaxRayScene
 from ._frame import Frame, framed
@@ -22,12 +22,13 @@ from ._rays import Hit, RayScene, Vectors, limits_of, paired, prepared
 _CHUNK = (4_096, 65_536)
 
 
-def ray_scene(meshes: Mesh | Sequence[Mesh]) -> RayScene:
+def ray_scene(meshes: Mesh | Sequence[Mesh], *, threads: int | None = None) -> RayScene:
     """Build a scene of one mesh or several that answers which rays they stop.
 
     An `EmbreeRayScene` where the package embreex can be imported, and a `JaxRayScene` elsewhere:
     the same questions and answers, slower on a CPU, which one `UserWarning` per process says. A
-    later change of a mesh is not seen. Raises `ValueError` for an empty sequence.
+    later change of a mesh is not seen. `threads` is for Embree alone: by how many a query's rays
+    are cast, by default one a core. Raises `ValueError` for an empty sequence and no thread.
 
     **Example**
 
@@ -38,10 +39,12 @@ def ray_scene(meshes: Mesh | Sequence[Mesh]) -> RayScene:
     >>> hit.face.shape, hit.barycentric.shape
     ((1,), (1, 3))
     """
+    if threads is not None:
+        threads = check_size("threads", threads)
     if _embree() is None:
         _warn_once()
         return JaxRayScene(meshes)
-    return EmbreeRayScene(meshes)
+    return EmbreeRayScene(meshes, threads=threads)
 
 
 def _embree() -> Any:
@@ -64,7 +67,7 @@ def _warn_once() -> None:
 
 
 class EmbreeRayScene:
-    """Casts rays by Embree, on all cores.
+    """Casts rays by Embree, on all cores or as many threads as told.
 
     Takes one `Mesh` or a sequence of them, relative to the `origin` of the first; a later change
     of a mesh is not seen. Faces stop rays from both sides. Directions and distances are float32
@@ -78,8 +81,10 @@ class EmbreeRayScene:
     for what they are not, `JaxRayScene` 0.5 % (tests/geometry/test_cast.py).
 
     A ray that starts on a surface may hit it: start it a little off, along the normal.
-    Answers do not depend on the number of threads or on how rays are cut into chunks. Runs on the
-    host, outside `jit`, and gives NumPy arrays. Not differentiable.
+    Answers do not depend on the number of threads or on how rays are cut into chunks. With
+    `threads=1` they are cast on the thread that asks, as suits a program that asks from several;
+    Embree still builds its tree on all cores. Runs on the host, outside `jit`, and gives NumPy
+    arrays. Not differentiable.
 
     Raises `ImportError` where embreex cannot be imported, and `ValueError` for no mesh.
 
@@ -94,7 +99,8 @@ class EmbreeRayScene:
 
     frame: Frame
 
-    def __init__(self, meshes: Mesh | Sequence[Mesh]):
+    def __init__(self, meshes: Mesh | Sequence[Mesh], *, threads: int | None = None):
+        self._threads = cores() if threads is None else check_size("threads", threads)
         classes = _embree()
         if classes is None:
             raise ImportError(
@@ -112,7 +118,6 @@ class EmbreeRayScene:
             build_mesh(self._scene, *part)
         # Embree builds its tree at the first query, and that must not happen on two threads.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
-        self._threads = cores()
 
     @functools.cached_property
     def _pool(self) -> ThreadPoolExecutor:
@@ -172,7 +177,8 @@ class EmbreeRayScene:
     def _each_chunk(self, count: int, run: Callable[[slice], None]) -> None:
         size = min(max(-(-count // self._threads), _CHUNK[0]), _CHUNK[1])
         parts = [slice(start, min(start + size, count)) for start in range(0, count, size)]
-        if len(parts) == 1:
-            run(parts[0])
+        if len(parts) == 1 or self._threads == 1:
+            for part in parts:
+                run(part)
         else:  # Embree runs without the interpreter's lock, so threads are enough
             list(self._pool.map(run, parts))

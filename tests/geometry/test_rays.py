@@ -118,8 +118,7 @@ def test_chunks_and_threads_do_not_change_answers(chunk, threads):
     whole = EmbreeRayScene(mesh)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_embree, "_CHUNK", (1, chunk))
-        patch.setattr(_embree, "cores", lambda: threads)
-        cut = EmbreeRayScene(mesh)
+        cut = EmbreeRayScene(mesh, threads=threads)
         occluded, hit = cut.occluded(origins, directions), cut.closest_hit(origins, directions)
     np.testing.assert_array_equal(occluded, whole.occluded(origins, directions))
     for a, b in zip(hit, whole.closest_hit(origins, directions), strict=True):

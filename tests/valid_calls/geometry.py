@@ -18,7 +18,7 @@ def calls():
     scene = g.JaxRayScene(mesh)
     made = {"normals": "smooth", "origin": (0.0, 0.0, 0.0), "two_sided": True}
     return {
-        "EmbreeRayScene": of(g.EmbreeRayScene, meshes=[mesh], slow=True),
+        "EmbreeRayScene": of(g.EmbreeRayScene, meshes=[mesh], threads=1, slow=True),
         "JaxRayScene": of(g.JaxRayScene, meshes=[mesh], slow=True),
         "JaxRayScene.closest_hit": of(scene.closest_hit, **rays, slow=True),
         "JaxRayScene.occluded": of(scene.occluded, **rays, max_distance=3.0, slow=True),
@@ -36,7 +36,7 @@ def calls():
             slow=True,
         ),
         "neighbors": of(g.neighbors, mesh=mesh, host=True),
-        "ray_scene": of(g.ray_scene, meshes=[mesh], slow=True),
+        "ray_scene": of(g.ray_scene, meshes=[mesh], threads=1, slow=True),
         "read_mesh": of(
             g.read_mesh, **file, colors="srgb", **made, free="path normals origin", slow=True
         ),
