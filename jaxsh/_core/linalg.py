@@ -1,34 +1,79 @@
-"""Products of matrices at the one precision that the package computes in.
+"""Products of matrices, in one of two precisions: the only place that states one.
 
-Accelerators multiply float32 matrices in fewer bits by default, which would cost the projections
-three of their digits; everything goes through here, so that there is one switch.
+Accelerators multiply float32 matrices in fewer bits by default: TF32 on NVIDIA's, bfloat16 on TPUs.
+That would cost projections, fits and rotations three of their digits. So everything is multiplied
+in full, but for shading where the user sets JAX's own switch, `jax.default_matmul_precision`. It
+is part of the key by which `jax.jit` finds compiled code. `docs/devices.md` says what it costs.
 """
+
+import functools
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-PRECISION = jax.lax.Precision.HIGHEST
+_FULL = jax.lax.Precision.HIGHEST
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+def in_full(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Decorates what prepares, projects or fits, to multiply in full whatever the switch says.
+
+    For what shares its kernels with shading, and for the products inside other libraries' solvers.
+    """
+
+    @functools.wraps(function)
+    def exact(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        with jax.default_matmul_precision("highest"):
+            return function(*args, **kwargs)
+
+    return exact
 
 
 def matmul(a: ArrayLike, b: ArrayLike) -> Array:
-    return jnp.matmul(a, b, precision=PRECISION)
+    return jnp.matmul(a, b, precision=_FULL)
 
 
 def dot(a: ArrayLike, b: ArrayLike) -> Array:
-    return jnp.dot(a, b, precision=PRECISION)
+    return jnp.dot(a, b, precision=_FULL)
 
 
 def einsum(subscripts: str, *operands: ArrayLike) -> Array:
-    return jnp.einsum(subscripts, *operands, precision=PRECISION)
+    return jnp.einsum(subscripts, *operands, precision=_FULL)
 
 
 def tensordot(a: ArrayLike, b: ArrayLike) -> Array:
     """Sums over the last axis of `a` and the first one of `b`."""
-    return jnp.tensordot(a, b, 1, precision=PRECISION)
+    return jnp.tensordot(a, b, 1, precision=_FULL)
 
 
-def tall_product(tall: Float[Array, "v k"], rows: Float[Array, "n k"]) -> Float[Array, "v n"]:
-    """tall @ rowsᵀ, with rows of zeros up to eight: XLA's CPU kernel is faster with eight."""
+def shading_matmul(a: ArrayLike, b: ArrayLike) -> Array:
+    """a @ b of what is shown, in the precision that the user has chosen."""
+    return jnp.matmul(a, b, precision=_chosen(a, b))
+
+
+def shading_tensordot(a: ArrayLike, b: ArrayLike) -> Array:
+    """`tensordot` of what is shown, in the precision that the user has chosen."""
+    return jnp.tensordot(a, b, 1, precision=_chosen(a, b))
+
+
+def shading_tall_product(
+    tall: Float[Array, "v k"], rows: Float[Array, "n k"]
+) -> Float[Array, "v n"]:
+    """tall @ rowsᵀ of what is shown, with rows of zeros up to eight.
+
+    XLA's CPU kernel is faster with eight.
+    """
     filled = jnp.pad(rows, ((0, max(0, 8 - len(rows))), (0, 0)))
-    return matmul(tall, filled.T)[:, : len(rows)]
+    return shading_matmul(tall, filled.T)[:, : len(rows)]
+
+
+def _chosen(a: ArrayLike, b: ArrayLike) -> jax.lax.Precision | None:
+    # The switch is for 32 bits: some of its values are refused for others, or would round them.
+    switch = jax.config.jax_default_matmul_precision  # pyright: ignore[reportAttributeAccessIssue]
+    wide = jnp.result_type(a, b).itemsize > 4
+    return _FULL if switch is None or wide else None  # None: as the switch says

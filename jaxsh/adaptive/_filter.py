@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from .._core.linalg import tall_product, tensordot
+from .._core.linalg import shading_tall_product, shading_tensordot
 from .._core.xla import on_mesh
 from ..harmonics import convolve, degree_of, evaluate, num_coefficients, phong, product_matrix
 from ..transfer import Material, Transfer
@@ -41,7 +41,7 @@ class Products(eqx.Module):
 
     def diffuse(self, start: int, end: int) -> Float[Array, "3 v"]:
         """Sum L_i O_i over harmonics `start` to `end`, of all vertices: algorithm 2."""
-        return tall_product(self.transfer[:, start:end], self.light[:, start:end]).T
+        return shading_tall_product(self.transfer[:, start:end], self.light[:, start:end]).T
 
     def base(self, degree: int, rows: Int[Array, " n"] | None) -> Float[Array, "3 n"]:
         """Multiply light, transfer and lobe up to a degree."""
@@ -188,7 +188,7 @@ def base_product(
     count: int,
 ) -> Float[Array, "3 n"]:
     """Computes S = Σ_ij α_i y_i(B) L̂_ij O_j over the first `count` harmonics."""
-    rows = tensordot(matrix[:, :count, :count], transfer[:count])
+    rows = shading_tensordot(matrix[:, :count, :count], transfer[:count])
     return jnp.sum(rows * kernel[None, :count], axis=1)
 
 
@@ -206,6 +206,6 @@ def increment(
     part is to be added.
     """
     block = matrix[:, old:new]
-    by_row = tensordot(block[..., :new], transfer[:new]) * kernel[None, old:new]
-    by_column = tensordot(block[..., :old], kernel[:old]) * transfer[None, old:new]
+    by_row = shading_tensordot(block[..., :new], transfer[:new]) * kernel[None, old:new]
+    by_column = shading_tensordot(block[..., :old], kernel[:old]) * transfer[None, old:new]
     return jnp.sum(by_row + by_column, axis=1)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Int8
 
 from .._core.checks import check_degree, check_flag, check_type
-from .._core.linalg import matmul, tall_product
+from .._core.linalg import matmul, shading_tall_product
 from .._core.xla import materialize
 from ..harmonics import degree_of
 from ..transfer import (
@@ -177,4 +177,5 @@ def row_products(
         return some.astype(axis.dtype) * lobe(x * a + y * b + z * c, lobes)
 
     axis = axis.at[:, rows].get(mode="promise_in_bounds")
-    return tall_product(materialize(lobed, axis, transfer.samples, lobes, rows), weights).T
+    values = materialize(lobed, axis, transfer.samples, lobes, rows)
+    return shading_tall_product(values, weights).T

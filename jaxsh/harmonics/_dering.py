@@ -255,7 +255,7 @@ def _refine(
         side = jnp.cross(directions, axis)
         side = side / jnp.linalg.norm(side, axis=-1, keepdims=True)
         tangents = jnp.stack([side, jnp.cross(directions, side)], axis=1)
-        nearby = directions[:, None] + scale * jnp.einsum("pt,vtx->vpx", patch, tangents)
+        nearby = directions[:, None] + scale * einsum("pt,vtx->vpx", patch, tangents)
         nearby = nearby / jnp.linalg.norm(nearby, axis=-1, keepdims=True)
         basis = evaluate(nearby, degree, axis=0)
         samples = einsum("k,kvp->vp", coefficients, basis)

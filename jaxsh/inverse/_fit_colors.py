@@ -17,7 +17,7 @@ import optimistix as optx
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from .._core.checks import check_all, check_number
-from .._core.linalg import matmul
+from .._core.linalg import einsum, in_full, matmul
 from ..midrange import Polygon
 from ..transfer import Transfer
 from ._checks import check_data, check_end, check_solver
@@ -34,6 +34,8 @@ def _box_solver(max_steps: int, tolerance: float):
     return jaxopt.BoxCDQP(maxiter=max_steps, tol=tolerance, implicit_diff=False)
 
 
+# For the products inside JAXopt's solver.
+@in_full
 def fit_colors(
     observed: Float[ArrayLike, "v 3"],
     transfer: Transfer,
@@ -175,6 +177,6 @@ def _confidence(
     count = jacobians.shape[-1]
     blocks = jax.vmap(lambda jacobian: covariance(jacobian, variance))(jacobians)
     whole = jnp.isfinite(blocks).all()
-    spread = jnp.einsum("cij,cd->icjd", jnp.where(whole, blocks, 0), jnp.eye(3, dtype=blocks.dtype))
+    spread = einsum("cij,cd->icjd", jnp.where(whole, blocks, 0), jnp.eye(3, dtype=blocks.dtype))
     spread = jnp.where(whole, spread, jnp.inf).reshape(3 * count, 3 * count)
     return Confidence(spread, jnp.sqrt(jnp.diagonal(spread)).reshape(count, 3))

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._core.checks import check_type
-from .._core.linalg import matmul
+from .._core.linalg import dot, matmul
 from ..midrange import Polygon
 
 
@@ -65,7 +65,7 @@ def rectangle_of(polygon: Polygon) -> Rectangle:
     across, up = (v[1] + v[2] - v[0] - v[3]) / 2, (v[2] + v[3] - v[0] - v[1]) / 2
     width, height = jnp.linalg.norm(across), jnp.linalg.norm(up)
     first = across / width
-    second = up / height - jnp.dot(first, up / height) * first
+    second = up / height - dot(first, up / height) * first
     axes = jnp.stack([first, second / jnp.linalg.norm(second)])
     return Rectangle(jnp.mean(v, axis=0), axes, jnp.stack([width, height]), polygon.radiance)
 

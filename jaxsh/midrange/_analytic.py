@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Bool, Float
 
 from .._core.checks import flatten_batch
+from .._core.linalg import dot, matmul
 from .._core.xla import keep_batch
 from ._cube import RadianceCube, texels
 from ._emitters import Polygon, Sphere
@@ -87,7 +88,7 @@ def _see_polygon(
     edges = polygon.vertices[1:] - polygon.vertices[:1]
     area = jnp.sum(jnp.cross(edges[:-1], edges[1:]), axis=0)
     normal = area / jnp.linalg.norm(area)
-    h = jnp.dot(normal, to_vertices[0])
+    h = dot(normal, to_vertices[0])
     behind = h > 0
     # The plane's own axes, and where the ray and the vertices are in them.
     first = edges[0] / jnp.linalg.norm(edges[0])
@@ -98,7 +99,7 @@ def _see_polygon(
     ahead = (inverse > 0) & (h < 0)
     distance = 1 / jnp.where(ahead, inverse, 1)
     x, y = (component_dot(tuple(axis), directions) * distance for axis in (first, second))
-    inside = _inside(to_vertices @ first, to_vertices @ second, x, y)
+    inside = _inside(matmul(to_vertices, first), matmul(to_vertices, second), x, y)
     bright = jnp.logical_or(polygon.two_sided, ~behind) & shines
     light = jnp.where(bright, polygon.radiance, 0)
     seen = _Seen(inverse, _fill(h, x), _rows(normal, x), _rows(light, x))
@@ -119,7 +120,7 @@ def _see_sphere(
     sphere: Sphere, shines: bool, point: Float[Array, " 3"], directions: Components
 ) -> tuple[Bool[Array, " n"], _Seen]:
     way = sphere.center - point
-    along, depth = component_dot(tuple(way), directions), sphere.radius**2 - jnp.dot(way, way)
+    along, depth = component_dot(tuple(way), directions), sphere.radius**2 - dot(way, way)
     squared = along * along + depth
     met = squared > 0
     root = jnp.sqrt(jnp.where(met, squared, 1))

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, check_choice, check_type
-from .._core.linalg import matmul
+from .._core.linalg import shading_matmul
 from ..transfer import Transfer
 from ..transfer._glossy_kernels import checked_albedo
 from ._expansion import Expansion, monomial_list
@@ -126,5 +126,5 @@ def _products(coefficients, terms):
     columns = columns.reshape(*terms.shape[:-4], terms.shape[-2], -1)
     width = columns.shape[-1]
     columns = jnp.pad(columns, [(0, 0)] * (columns.ndim - 1) + [(0, -width % 8)])
-    products = matmul(coefficients, columns)
+    products = shading_matmul(coefficients, columns)
     return (products[..., start : start + 3] for start in range(0, width, 3))

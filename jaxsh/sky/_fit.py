@@ -18,7 +18,7 @@ from .._core.checks import (
     check_type,
     described,
 )
-from .._core.linalg import einsum, matmul
+from .._core.linalg import einsum, in_full, matmul
 from ..harmonics import orders
 from ._angles import half_rows
 from ._project import Model, project
@@ -29,6 +29,8 @@ from ._solve import Solution, Solver, least_squares
 OPTIONS = ("zenith", "weight", "lawson", "samples", "project", "solver", "max_steps", "throw")
 
 
+# The model's own products too.
+@in_full
 def fit(
     model: Model,
     parameters: Mapping[str, tuple[float, float]],
@@ -114,7 +116,7 @@ def fit(
     if mix.shape != (channels, channels):
         raise ValueError(f"expected mix ({channels}, {channels}), got shape {mix.shape}")
     rows = half_rows(degree)
-    targets = jnp.einsum("qc,scr->qrs", jnp.linalg.inv(mix), exact[..., rows])
+    targets = einsum("qc,scr->qrs", jnp.linalg.inv(mix), exact[..., rows])
 
     powers = orders(degree)[rows] if parity else np.zeros_like(rows)
     scales = monomials(jnp.sin(theta), degree + 1)[powers]

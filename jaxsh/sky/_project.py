@@ -11,7 +11,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import check_batches, check_degree, check_flag, check_function
 from .._core.host import read_only_cache
-from .._core.linalg import einsum
+from .._core.linalg import einsum, in_full
 from ..harmonics import degrees, evaluate, orders, rotate_z
 from ._angles import directions, each_sun, parameter, unit
 from ._color import Space, check_space
@@ -34,6 +34,8 @@ _REACH = 3.3
 _MOST = 1024
 
 
+# The model's own products too.
+@in_full
 def project(
     model: Model,
     sun: Float[ArrayLike, "*suns 3"],

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import as_finite, check_flag, check_type
-from .._core.linalg import tall_product
+from .._core.linalg import in_full, shading_tall_product
 from ..harmonics import degree_of, num_coefficients
 from ._glossy_kernels import lobe_polynomial, lobe_products
 from ._material import Material, checked_eye, checked_material
@@ -56,6 +56,7 @@ class FixedView(eqx.Module):
         return _shade(self.coefficients, light.astype(self.coefficients.dtype))
 
 
+@in_full
 def fixed_view(
     transfer: Transfer,
     eye: Float[ArrayLike, " 3"],
@@ -125,5 +126,5 @@ def _shade(coefficients, light):
         # Each channel's row is zero where the coefficients are another channel's.
         own = jnp.tile(jnp.eye(3, dtype=bool), (math.prod(batch), 1))
         rows = jnp.where(own[..., None], rows[:, None], 0.0).reshape(len(rows), 3 * width)
-    products = tall_product(coefficients.reshape(len(coefficients), rows.shape[1]), rows)
+    products = shading_tall_product(coefficients.reshape(len(coefficients), rows.shape[1]), rows)
     return jnp.moveaxis(products.reshape(len(coefficients), *batch, 3), 0, -2)

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float, Int8, Num
 from numpy.polynomial import Polynomial
 
 from .._core.host import read_only_cache
-from .._core.linalg import matmul, tensordot
+from .._core.linalg import matmul, shading_matmul, tensordot
 from .._core.vectors import normalize
 from .._core.xla import materialize, on_mesh
 from ..harmonics import degree_of, legendre, orders, phong
@@ -240,7 +240,7 @@ def lobe_products(
 
     def share(directions, weights, some):
         values = transfer.at_nodes(some, width) * lobe(cosines(directions, axis), lobes)
-        return matmul(weights, values)
+        return shading_matmul(weights, values)
 
     # On one CPU the values of a pass stay in cache; elsewhere a loop would leave devices idle.
     def in_passes(*parts):
@@ -313,7 +313,7 @@ def _written_out(weights, values):
 
 
 def _as_matrices(weights, values):
-    return matmul(weights, values.astype(weights.dtype))
+    return shading_matmul(weights, values.astype(weights.dtype))
 
 
 @functools.partial(jax.jit, static_argnums=1)

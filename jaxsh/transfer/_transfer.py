@@ -17,7 +17,7 @@ from .._core.checks import (
     check_finite,
     check_type,
 )
-from .._core.linalg import matmul, tall_product
+from .._core.linalg import matmul, shading_matmul, shading_tall_product
 from .._core.xla import materialize, on_mesh
 from ..harmonics import degree_of, num_coefficients
 from ._glossy_kernels import (
@@ -172,7 +172,7 @@ class Transfer(AbstractTransfer):
 
     def at_nodes(self, some: Float[Array, "n k"], width: int) -> Float[Array, "n v"]:
         """Evaluate the transfer at the nodes of one pass."""
-        return matmul(some, self.coefficients[:, :width].T)
+        return shading_matmul(some, self.coefficients[:, :width].T)
 
 
 class SampledTransfer(AbstractTransfer):
@@ -340,7 +340,7 @@ def quantize(transfer: Transfer) -> QuantizedTransfer:
 
 def _irradiances(coefficients, lights):
     filled = jnp.pad(lights, ((0, 0), (0, coefficients.shape[1] - lights.shape[1])))
-    return tall_product(coefficients, filled)
+    return shading_tall_product(coefficients, filled)
 
 
 def checked_degree(transfer: AbstractTransfer, degree: int | None) -> int:
