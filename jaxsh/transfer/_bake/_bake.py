@@ -1,25 +1,25 @@
 """Baking transfer: rays for every vertex, projected."""
 
 import functools
-import math
+import operator
 import os
+import warnings
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from ... import geometry
-from ..._core.checks import as_path, check_degree, check_size, check_type
+from ..._core.checks import as_host_float, as_path, check_degree, check_size, check_type
 from ...geometry import Mesh, RayScene, ray_scene
 from .._transfer import Transfer
 from ._blind import why_blind
-from ._checkpoint import Checkpoint, fingerprint
-from ._directions import guided, turned_fibonacci
-from ._faults import check_arguments, report
-from ._gather import TILE, bounced, shadowed
+from ._faults import check_arguments, faults
+from ._job import BakeArguments, Job, Prepared
+from ._kept import BakeStore, refuse
 from ._origins import origins
 from ._passes import Passes, progress_bar
-from ._receivers import Receivers, surface, unit_normals, unshadowed
+from ._receivers import unit_normals
 
 
 def bake(
@@ -35,7 +35,7 @@ def bake(
     scene: RayScene | None = None,
     seed: int = 0,
     chunk: int = 256,
-    checkpoint: str | os.PathLike[str] | None = None,
+    store: str | os.PathLike[str] | None = None,
     progress: bool = True,
 ) -> Transfer:
     """Bake the transfer of a mesh: for each vertex ∫ V(ω) max(0, n·ω) y_i(ω) dω, by rays.
@@ -71,9 +71,10 @@ def bake(
       `geometry.RayScene`. For bounces the mesh must be the first in it. By default
       `geometry.ray_scene(mesh)`, which casts by JAX where Embree is not installed.
     - `chunk`: vertices in a block, rounded up to a multiple of 64. Each core works on one block.
-    - `checkpoint`: a file that keeps the blocks finished so far. A bake that was stopped goes on
-      from it when called again with the same arguments; it is removed when the bake is done. It
-      does not record `scene`: pass the same one when you resume.
+    - `store`: a folder, made here, that keeps the blocks finished so far and in the end the whole
+      transfer, for any reader of Zarr 3. A bake that was stopped goes on from it when called again
+      with the same arguments, and blocks that are damaged are baked again. It does not record
+      `scene`: pass the same one when you resume.
     - `progress`: shows a bar when standard error is a terminal and the bake takes over a second.
 
     **Returns** a `Transfer` of the dtype of the mesh's vertices. On one machine a seed gives the
@@ -88,8 +89,9 @@ def bake(
     of each other by chance: leave a gap. Of rays that graze a surface within rounding a few hit
     what they miss, by Embree more than by `geometry.JaxRayScene`.
 
-    Raises `ValueError` for arguments and values out of range, and for the checkpoint of another
-    bake. Runs in NumPy on the host, outside `jit`, and does not shard: give the result's arrays to
+    Raises `ValueError` for arguments and values out of range, and for the store of another bake or
+    another thing, which is left as it is; `OSError` where the store cannot be written. Runs in
+    NumPy on the host, outside `jit`, and does not shard: give the result's arrays to
     `jax.device_put`. Not differentiable: visibility is a step.
 
     **Example**
@@ -103,50 +105,52 @@ def bake(
     seed = check_size("seed", seed, least=0)
     if scene is not None:
         check_type("scene", scene, RayScene)
-    if checkpoint is not None:
-        checkpoint = as_path(checkpoint, "checkpoint")
+    path = None if store is None else as_path(store, "store")
     check_arguments(mesh, directions, shadows, bounces, albedo, ray_bias, offset, chunk)
+    arguments = BakeArguments(
+        degree=degree,
+        directions=operator.index(directions),
+        shadows=bool(shadows),
+        bounces=operator.index(bounces),
+        albedo=as_host_float(albedo, "albedo"),
+        ray_bias=None if ray_bias is None else float(ray_bias),
+        offset=None if offset is None else float(offset),
+        seed=seed,
+        scene=scene is not None,
+    )
+    identity = {} if path is None else arguments.identity(mesh)
+    if path is not None:
+        refuse(path, identity)
     normals = unit_normals(mesh)
-    exact = unshadowed(normals, degree)
-    if not shadows:
-        report(mesh, normals, exact, lambda blind: [])
-        return _transfer(mesh, exact)
-
-    shape, dtype = exact.shape, exact.dtype
-    reflected = np.asarray(albedo, dtype).reshape(-1, 1) / math.pi
-    file = None
-    if checkpoint is not None:
-        identity = {
-            "mesh": fingerprint(mesh.vertices, mesh.faces, mesh.normals),
-            "degree": degree,
-            "directions": directions,
-            "bounces": bounces,
-            "albedo": fingerprint(reflected),
-            "ray_bias": ray_bias,
-            "offset": offset,
-            "scene": scene is not None,
-            "seed": seed,
-        }
-        file = Checkpoint(checkpoint, identity, (TILE, shape[1]), dtype)
-    scene = ray_scene(mesh) if scene is None else scene
-    start = origins(mesh, normals, scene, ray_bias, offset)
-    points = Receivers(start.positions, normals, exact)
-    with progress_bar((1 + bounces) * len(normals), progress) as bar:
-        passes = Passes(shape, dtype, chunk, file, bar)
-        lights = guided(directions, degree, seed, dtype)
-        direct = passes.run(0, functools.partial(shadowed, scene, points, lights))
-        report(mesh, normals, direct, lambda blind: why_blind(mesh, scene, blind, normals, start))
-        coefficients = direct
-        if bounces:
-            vectors, met = turned_fibonacci(directions, seed, dtype), surface(mesh)
-            for bounce in range(1, bounces + 1):
-                # T_{b+1} = T_0 + ∫ over blocked directions of cosine · albedo/π · T_b at the hit.
-                outgoing = reflected * coefficients
-                gather = functools.partial(bounced, scene, points, vectors, met, outgoing)
-                coefficients = direct + passes.run(bounce, gather)
-    if file:
-        file.remove()
+    if shadows:
+        scene = ray_scene(mesh) if scene is None else scene
+        start = origins(mesh, normals, scene, ray_bias, offset)
+        positions = start.positions
+        why = functools.partial(why_blind, mesh, scene, normals=normals, start=start)
+    else:
+        scene, positions, why = None, np.asarray(mesh.vertices), _unasked
+    job = Job(mesh, arguments, scene, Prepared(normals, positions))
+    kept = None if path is None else BakeStore.of(path, mesh, job, identity)
+    with progress_bar(job.passes * len(normals), progress) as bar:
+        passes = Passes(job, chunk, kept, bar)
+        if kept is not None and kept.finished:
+            said = kept.attributes["warning"]
+            coefficients = passes.run(job.passes - 1)
+        else:
+            coefficients = direct = passes.run(0)
+            blind = ~direct.any(axis=1) & normals.any(axis=1)
+            said = faults(mesh, normals, np.flatnonzero(blind), why)
+            for bounce in range(1, job.passes):
+                coefficients = passes.run(bounce, coefficients, direct)
+            if kept is not None:
+                kept.finish(said)
+    if said:
+        warnings.warn(said, UserWarning, stacklevel=2)
     return _transfer(mesh, coefficients)
+
+
+def _unasked(blind: np.ndarray) -> list[str]:
+    return []  # without shadows no vertex is blind
 
 
 def _transfer(mesh: Mesh, coefficients: Float[np.ndarray, "v k"]) -> Transfer:

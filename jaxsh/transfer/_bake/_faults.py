@@ -1,6 +1,5 @@
 """Checks of `bake`: its arguments before the rays, unlit vertices after them."""
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -64,25 +63,22 @@ def check_arguments(
     check_finite("albedo", share, least=0.0, wait=True)
 
 
-def report(
+def faults(
     mesh: Mesh,
     normals: Float[np.ndarray, "v 3"],
-    direct: Float[np.ndarray, "v k"],
+    blind: Int[np.ndarray, " n"],
     why: Callable[[Int[np.ndarray, " n"]], list[str]],
-) -> None:
-    """Warn once, on behalf of `bake`, about vertices that no light reaches directly.
+) -> str:
+    """Say how many vertices no light reaches directly, and why; nothing where there are none.
 
-    `why` says why some vertices see nothing, and is asked only where there are any.
+    `blind` have a normal and see nothing. `why` is asked about them only where there are any.
     """
     undefined = np.logical_not(normals.any(axis=1))
-    blind = np.logical_not(direct.any(axis=1)) & ~undefined
     found = []
     if count := int(undefined.sum()):
         reasons = ", ".join(why_undefined(mesh, undefined))
-        found.append(f"{count} of {len(direct)} vertices have no normal ({reasons})")
-    if count := int(blind.sum()):
-        reasons = ", ".join(why(np.flatnonzero(blind)))
-        found.append(f"{count} of {len(direct)} vertices see nothing ({reasons})")
-    if found:
-        message = f"bake: {' and '.join(found)}; they get no direct light"
-        warnings.warn(message, UserWarning, stacklevel=3)
+        found.append(f"{count} of {len(normals)} vertices have no normal ({reasons})")
+    if len(blind):
+        reasons = ", ".join(why(blind))
+        found.append(f"{len(blind)} of {len(normals)} vertices see nothing ({reasons})")
+    return f"bake: {' and '.join(found)}; they get no direct light" if found else ""

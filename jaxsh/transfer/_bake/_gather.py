@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Float, Int
 from ..._core.linalg import matmul
 from ...geometry import RayScene
 from ._directions import Directions
-from ._receivers import Receivers, Surface
+from ._receivers import Receivers, Surface, unshadowed
 
 # Rows of every product: with one fixed shape a vertex's sums are added in one fixed order,
 # whatever the block it comes in.
@@ -21,6 +21,7 @@ def shadowed(
     scene: RayScene,
     receivers: Receivers,
     directions: Directions,
+    degree: int,
     rows: slice,
 ) -> Float[np.ndarray, "rows k"]:
     """Project visibility times cosine: the cosine's coefficients less those of the blocked part.
@@ -28,10 +29,12 @@ def shadowed(
     The cosine's are exact, so that only the blocked part carries the error of the directions, and
     none is left where nothing is blocked. Exactly zero where no ray gets out.
     """
-    cosines = _in_tiles(receivers.normals[rows], directions.vectors.T)
+    normals = receivers.normals[rows]
+    cosines = _in_tiles(normals, directions.vectors.T)
     above = cosines > 0
     blocked = _blocked(scene, receivers.origins[rows], directions, above)
-    coefficients = receivers.unshadowed[rows] - _in_tiles(cosines * blocked, directions.basis)
+    part = _in_tiles(cosines * blocked, directions.basis)
+    coefficients = unshadowed(normals, degree) - part
     coefficients[above.any(axis=1) & (above == blocked).all(axis=1)] = 0
     return coefficients
 
@@ -72,12 +75,13 @@ def bounced(
     receivers: Receivers,
     vectors: Float[np.ndarray, "d 3"],
     surface: Surface,
-    outgoing: Float[np.ndarray, "v k"],
+    share: Float[np.ndarray, " v_or_1"],
+    before: Float[np.ndarray, "v k"],
     rows: slice,
 ) -> Float[np.ndarray, "rows k"]:
-    """Sum w max(0, n·ω) outgoing(hit) over the rays that meet the front of a face of the mesh.
+    """Sum w max(0, n·ω) share · before over the rays that meet the front of a face of the mesh.
 
-    `outgoing` is interpolated between the vertices of a face with the hit's barycentrics.
+    At a hit they are interpolated between the vertices of the face with its barycentrics.
     """
     from scipy.sparse import csr_array
 
@@ -91,8 +95,9 @@ def bounced(
     weights = weights[:, None] * hit.barycentric[met].astype(cosines.dtype)
     ends = 3 * np.searchsorted(rays.row[met], np.arange(len(cosines) + 1))
     corners = surface.faces[hit.face[met]]
-    shape = len(cosines), len(outgoing)
-    return csr_array((weights.ravel(), corners.ravel(), ends), shape) @ outgoing
+    weights *= share[corners] if len(share) > 1 else share
+    shape = len(cosines), len(before)
+    return csr_array((weights.ravel(), corners.ravel(), ends), shape) @ before
 
 
 class _Rays(NamedTuple):

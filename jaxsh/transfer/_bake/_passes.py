@@ -1,4 +1,4 @@
-"""Passes over all vertices, block by block on every core, with a bar and a checkpoint."""
+"""Passes over all vertices, block by block on every core, with a bar and a store."""
 
 import contextlib
 import dataclasses
@@ -7,49 +7,56 @@ from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from ..._core.host import cores
-from ._checkpoint import Checkpoint
 from ._gather import TILE
+from ._job import Job
+from ._kept import BakeStore
 
 Gather = Callable[[slice], np.ndarray]
 
 
 @dataclasses.dataclass(frozen=True)
 class Passes:
-    """Fills arrays of one shape, one for each pass, on threads, in blocks of whole tiles.
+    """Fills arrays of one shape, one for each pass, on threads, in parts of whole tiles.
 
-    Tiles that the checkpoint holds are not computed again, and new ones are added to it.
+    Blocks that the store holds are not computed again, and new ones are added to it.
     """
 
-    shape: tuple[int, int]
-    dtype: np.dtype
+    job: Job
     chunk: int
-    checkpoint: Checkpoint | None
+    store: BakeStore | None
     bar: Any
 
-    def run(self, number: int, gather: Gather) -> Float[np.ndarray, "v k"]:
-        """Compute the array of pass `number`: `gather` gives its rows for a slice of them."""
-        count, width = self.shape
-        tiles = np.zeros((-(-count // TILE), TILE, width), self.dtype)
-        rows = tiles.reshape(-1, width)[:count]
-        first = 0
-        if self.checkpoint:
-            finished = self.checkpoint.read(number * len(tiles), len(tiles))
-            tiles[: len(finished)] = finished
-            first = min(len(finished) * TILE, count)
-        self.bar.update(first)
+    def run(
+        self,
+        number: int,
+        before: Float[np.ndarray, "v k"] | None = None,
+        direct: Float[np.ndarray, "v k"] | None = None,
+    ) -> Float[np.ndarray, "v k"]:
+        """Compute the coefficients of pass `number`, for which see `Job.rows`."""
+        count, store = self.job.num_points, self.store
+        rows = np.empty((count, self.job.width), self.job.dtype)
+        missing = [slice(0, count)] if store is None else store.fill(number, rows)
+        self.bar.update(count - sum(part.stop - part.start for part in missing))
+
+        def gather(part: slice) -> np.ndarray:
+            return self.job.rows(number, part, before, None if direct is None else direct[part])
+
         size = -(-self.chunk // TILE) * TILE
-        parts = [slice(start, min(start + size, count)) for start in range(first, count, size)]
+        parts = [
+            slice(start, min(start + size, run.stop))
+            for run in missing
+            for start in range(run.start, run.stop, size)
+        ]
         with contextlib.closing(_in_order(gather, parts)) as blocks:
             for part, values in blocks:
                 rows[part] = values
-                if self.checkpoint:
-                    self.checkpoint.append(tiles[part.start // TILE : -(-part.stop // TILE)])
+                if store is not None:
+                    for block in store.ended_by(part):
+                        store.write_pass(number, block, rows[store.rows(block)])
                 self.bar.update(len(values))
         return rows
 
@@ -73,15 +80,8 @@ def progress_bar(total: int, shown: bool):
 
 def _in_order(gather: Gather, parts: list[slice]) -> Generator[tuple[slice, np.ndarray]]:
     """Yield each part with its rows. After an exception or interrupt later parts do not start."""
-    # `with jax.enable_x64(True)` holds on its own thread alone.
-    double = jnp.result_type(float) == jnp.float64
-
-    def run(part: slice) -> np.ndarray:
-        with jax.enable_x64(double):
-            return gather(part)
-
     with ThreadPoolExecutor(cores()) as pool:
-        futures = [pool.submit(run, part) for part in parts]
+        futures = [pool.submit(gather, part) for part in parts]
         try:
             for part, future in zip(parts, futures, strict=True):
                 yield part, future.result()

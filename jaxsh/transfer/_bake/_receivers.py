@@ -13,7 +13,7 @@ from ...harmonics import clamped_cosine, convolve, evaluate, num_coefficients
 
 # Faces cancel where the sum of their area vectors is but the rounding of its terms.
 _CANCELLED = 8 * np.finfo(np.float32).eps
-_UP, _BLOCK = np.array([0, 0, 1]), 1024
+_UP, _BLOCK = np.array([0, 0, 1]), 256
 
 
 class Receivers(NamedTuple):
@@ -21,7 +21,6 @@ class Receivers(NamedTuple):
 
     origins: Float[np.ndarray, "v 3"]  # of rays, a little off the surface
     normals: Float[np.ndarray, "v 3"]  # unit, zero where undefined
-    unshadowed: Float[np.ndarray, "v k"]  # of the clamped cosine alone; zero about a zero normal
 
 
 class Surface(NamedTuple):

@@ -1,0 +1,147 @@
+"""The store of a bake: made once, filled block by block, refused where it is of another bake."""
+
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ... import geometry
+from ..._core.words import reason
+from ...geometry import Mesh, RayScene
+from .._store import BlockStore, DamagedError, block_rows, make
+from ._job import BakeArguments, Job, Prepared
+
+_PASSES = "passes"
+
+
+class BakeStore(BlockStore):
+    """Keeps the passes of a bake; the last of them is the transfer.
+
+    Beside the transfer it holds what the rows of any block are computed from, so that a process
+    that opens the path needs nothing else.
+    """
+
+    @staticmethod
+    def of(path: Path, mesh: Mesh, job: Job, identity: dict[str, Any]) -> "BakeStore":
+        """Make the store of a job, or mend the one that is there, but for its passes.
+
+        `identity` is that of the job's arguments. Raises what `refuse` does.
+        """
+        arrays = {
+            "positions": np.asarray(mesh.vertices),
+            "normals": np.asarray(mesh.normals),
+            "faces": np.asarray(mesh.faces),
+            "unit_normals": job.prepared.normals,
+            "origins": job.prepared.origins,
+            "albedo": np.atleast_1d(job.arguments.albedo),
+        }
+        names = [_name(number, job.passes) for number in range(job.passes)]
+        later = {name: ((job.num_points, job.width), job.dtype) for name in names}
+        if not _stands(path):
+            arrays["neighbors"] = np.asarray(geometry.neighbors(mesh))
+            about = {"degree": job.arguments.degree, "arguments": identity}
+            make(path, arrays, later, block_rows(job.num_points), about)
+            return BakeStore(path)
+        refuse(path, identity)
+        store = BakeStore(path)
+        for name, array in arrays.items():
+            store.put(name, array)
+        if store.missing("neighbors", check=True):
+            store.put("neighbors", np.asarray(geometry.neighbors(mesh)))
+        if not store.finished:
+            store.add(later)
+        return store
+
+    @property
+    def passes(self) -> int:
+        """How many passes over the vertices the bake has."""
+        return 1 + self.attributes["arguments"]["bounces"]
+
+    def job(self, scene: RayScene | None = None) -> Job:
+        """Build the job from what is stored; by default the mesh is the scene."""
+        albedo = self.whole("albedo")
+        arguments = BakeArguments.restored(
+            self.attributes["arguments"], albedo if len(albedo) > 1 else albedo[0]
+        )
+        mesh = self.mesh()
+        if scene is None and arguments.shadows:
+            scene = geometry.ray_scene(mesh)
+        prepared = Prepared(self.whole("unit_normals"), self.whole("origins"))
+        return Job(mesh, arguments, scene, prepared)
+
+    def mesh(self) -> Mesh:
+        """Read the mesh."""
+        vertices, faces, normals = map(self.whole, ("positions", "faces", "normals"))
+        return Mesh(jnp.asarray(vertices), jnp.asarray(faces), jnp.asarray(normals))
+
+    def missing_of(self, number: int, *, check: bool = False) -> list[int]:
+        """List the blocks of a pass that are not there in full, as `missing` does."""
+        return self.missing(self._pass(number), check=check)
+
+    def read_pass(self, number: int, block: int) -> Float[np.ndarray, "rows k"]:
+        """Read one block of a pass; raises `DamagedError` where it is not right."""
+        return self.read(self._pass(number), block)
+
+    def whole_pass(self, number: int) -> Float[np.ndarray, "v k"]:
+        """Read a pass; raises `DamagedError` for the first block that is not right."""
+        return self.whole(self._pass(number))
+
+    def write_pass(self, number: int, block: int, values: Float[np.ndarray, "rows k"]) -> None:
+        """Write one block of a pass: its file is there whole, or not at all."""
+        self.write(self._pass(number), block, values)
+
+    def fill(self, number: int, rows: Float[np.ndarray, "v k"]) -> list[slice]:
+        """Fill in what is there of a pass, and list the runs of rows that are not."""
+        missing = []
+        for block in range(self.num_blocks):
+            part = self.rows(block)
+            try:
+                rows[part] = self.read_pass(number, block)
+            except DamagedError:
+                if missing and missing[-1].stop == part.start:
+                    part = slice(missing.pop().start, part.stop)
+                missing.append(part)
+        return missing
+
+    def ended_by(self, part: slice) -> range:
+        """Tell the blocks whose last row is in a part."""
+        stop = self.num_blocks if part.stop == self.num_points else part.stop // self.block_rows
+        return range(part.start // self.block_rows, stop)
+
+    @property
+    def finished(self) -> bool:
+        """Whether `finish` was called, and each block of the transfer is still right."""
+        return "warning" in self.attributes and not self.missing(check=True)
+
+    def finish(self, warning: str) -> None:
+        """Keep what the user is to be told, and let go of what only the bake needed."""
+        self.record(warning=warning)
+        self.drop(*([_PASSES] if self.passes > 1 else []))
+
+    def _pass(self, number: int) -> str:
+        return _name(number, self.passes)
+
+
+def refuse(path: Path, identity: dict[str, Any]) -> None:
+    """Raise `ValueError`, that says what differs, where another bake or another thing is stored."""
+    if not _stands(path):
+        return
+    found = BlockStore(path).attributes.get("arguments")
+    found = found if isinstance(found, dict) else {}
+    for name, value in identity.items():
+        if found.get(name) != value:
+            raise ValueError(
+                f"{path}: the store of another bake: its {name} is {reason(str(found.get(name)))}, "
+                f"and {value} here; it is left as it is"
+            )
+
+
+def _stands(path: Path) -> bool:
+    """Tell whether anything is at a path; an empty folder does not count."""
+    return path.exists() and not (path.is_dir() and not any(path.iterdir()))
+
+
+def _name(number: int, passes: int) -> str:
+    return "coefficients" if number == passes - 1 else f"{_PASSES}/{number}"
