@@ -1,13 +1,12 @@
 """Baking transfer: rays for every vertex, projected."""
 
-import functools
 import operator
 import os
 import warnings
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import ArrayLike, Float
+from jaxtyping import ArrayLike, Float, Int
 
 from ... import geometry
 from ..._core.checks import as_host_float, as_path, check_degree, check_size, check_type
@@ -122,14 +121,18 @@ def bake(
     if path is not None:
         refuse(path, identity)
     normals = unit_normals(mesh)
+    caster, start, positions = None, None, np.asarray(mesh.vertices)
     if shadows:
-        scene = ray_scene(mesh) if scene is None else scene
-        start = origins(mesh, normals, scene, ray_bias, offset)
+        caster = ray_scene(mesh) if scene is None else scene
+        start = origins(mesh, normals, caster, ray_bias, offset)
         positions = start.positions
-        why = functools.partial(why_blind, mesh, scene, normals=normals, start=start)
-    else:
-        scene, positions, why = None, np.asarray(mesh.vertices), _unasked
-    job = Job(mesh, arguments, scene, Prepared(normals, positions))
+
+    def why(blind: Int[np.ndarray, " n"]) -> list[str]:
+        if caster is None or start is None:
+            return []
+        return why_blind(mesh, caster, blind, normals, start)
+
+    job = Job(mesh, arguments, caster, Prepared(normals, positions))
     kept = None if path is None else BakeStore.of(path, mesh, job, identity)
     with progress_bar(job.passes * len(normals), progress) as bar:
         passes = Passes(job, chunk, kept, bar)
@@ -147,10 +150,6 @@ def bake(
     if said:
         warnings.warn(said, UserWarning, stacklevel=2)
     return _transfer(mesh, coefficients)
-
-
-def _unasked(blind: np.ndarray) -> list[str]:
-    return []  # without shadows no vertex is blind
 
 
 def _transfer(mesh: Mesh, coefficients: Float[np.ndarray, "v k"]) -> Transfer:

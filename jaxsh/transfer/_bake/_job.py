@@ -85,7 +85,7 @@ class Job:
 
     @property
     def passes(self) -> int:
-        """How many passes over the vertices there are: the direct light's, and one a bounce."""
+        """Count the passes over the vertices: the direct light's, and one a bounce."""
         return 1 + self.arguments.bounces
 
     def rows(

@@ -56,7 +56,7 @@ class BakeStore(BlockStore):
 
     @property
     def passes(self) -> int:
-        """How many passes over the vertices the bake has."""
+        """Count the passes of the bake over the vertices."""
         return 1 + self.attributes["arguments"]["bounces"]
 
     def job(self, scene: RayScene | None = None) -> Job:
@@ -112,7 +112,7 @@ class BakeStore(BlockStore):
 
     @property
     def finished(self) -> bool:
-        """Whether `finish` was called, and each block of the transfer is still right."""
+        """Tell whether `finish` was called, and each block of the transfer is still right."""
         return "warning" in self.attributes and not self.missing(check=True)
 
     def finish(self, warning: str) -> None:
