@@ -6,15 +6,18 @@
 # (lint, types), make docs (the pages, built strictly), make test-oldest (the oldest JAX that is
 # supported), make test-newest (the newest Python here, and its JAX), make test-minimal (without the
 # packages that only some functions need), make package (wheel and sdist), make bench (beside the
-# peers), make fuzz (changed files of every format, a million of each: FUZZ="--inputs 10000 --formats
+# peers), make gpu (times of the device that JAX takes beside its limits, as JSON), make fuzz (changed files of every format, a million of each: FUZZ="--inputs 10000 --formats
 # obj glb" for fewer), make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
 BENCH_VENV ?= .venv-bench
+GPU_VENV ?= .venv-gpu
 OLDEST_VENV ?= .venv-oldest
 NEWEST_VENV ?= .venv-newest
 PRESET ?= quick
+# JAX with CUDA where there is NVIDIA's driver.
+GPU_JAX ?= $(if $(shell command -v nvidia-smi 2> /dev/null),jax[cuda12],jax)
 bin := $(VENV)/bin
 # loadfile: what one file has traced serves its other tests.
 PARALLEL ?= -n auto --dist loadfile
@@ -23,7 +26,7 @@ PARALLEL ?= -n auto --dist loadfile
 # JAX, test-all and a plain pytest go without.
 QUICK_COMPILE ?= --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false
 
-.PHONY: environments reproduce report readme test test-slow test-all test-oldest test-newest test-minimal check docs package bench fuzz clean
+.PHONY: environments reproduce report readme test test-slow test-all test-oldest test-newest test-minimal check docs package bench gpu fuzz clean
 
 # An environment, of another Python where one is named. Groups of dependencies need pip >= 25.1.
 define environment
@@ -48,6 +51,13 @@ endef
 $(BENCH_VENV)/installed: pyproject.toml
 	$(call environment,$(BENCH_VENV))
 	$(BENCH_VENV)/bin/python -m pip install --quiet --editable . --group peers
+	touch $@
+
+# With sphericart's kernels where it has some for a JAX that we take.
+$(GPU_VENV)/installed: pyproject.toml
+	$(call environment,$(GPU_VENV))
+	$(GPU_VENV)/bin/python -m pip install --quiet --editable . --group test --group peers "$(GPU_JAX)" || \
+		$(GPU_VENV)/bin/python -m pip install --quiet --editable . --group test "$(GPU_JAX)"
 	touch $@
 
 # The floors of pyproject.toml as they stand: tools/floors.py prints them.
@@ -112,10 +122,14 @@ package: $(VENV)/installed
 bench: $(BENCH_VENV)/installed
 	$(BENCH_VENV)/bin/python -m benchmarks
 
+# Only JSON on the standard output: GPU="--only glossy" for some cases.
+gpu: $(GPU_VENV)/installed
+	@$(GPU_VENV)/bin/python -m benchmarks.gpu $(GPU)
+
 # Beside other readers, where there are wheels of them.
 fuzz: $(VENV)/installed
 	-$(bin)/python -m pip install --quiet --group fuzz
 	$(bin)/python tests/fuzz $(FUZZ)
 
 clean:
-	rm -rf $(VENV) $(BENCH_VENV) $(OLDEST_VENV) $(NEWEST_VENV) .cache dist results site
+	rm -rf $(VENV) $(BENCH_VENV) $(GPU_VENV) $(OLDEST_VENV) $(NEWEST_VENV) .cache dist results site

@@ -1,0 +1,66 @@
+"""`python -m benchmarks.gpu` runs on a CPU too, with tiny sizes."""
+
+import json
+import subprocess
+import sys
+
+import jax.numpy as jnp
+import pytest
+
+from benchmarks import _gpu_cases, _gpu_limits, gpu
+
+
+def test_a_case_is_set_beside_its_limit():
+    # An amount per second of 1 for each limit: the share is the rate.
+    limits = {name: {"value": 1.0, "unit": probe.unit} for name, probe in _gpu_limits.probes(8, 4)}
+    square = jnp.ones((4, 4), jnp.float32)
+    case = _gpu_cases.Case(
+        *("square", jnp.matmul, (square, square), 16, "numbers", 192.0),
+        limit="tf32",
+        operations=128.0,
+        precision="tf32",
+    )
+    full = {}
+    row = gpu.measure(case, limits, rounds=1, full=full)
+    assert row["finite"]
+    assert row["limit"] == "tf32"
+    assert full == {}
+    assert row["share"] == row["share_of_product"] == 128 / row["seconds"]
+    assert row["share_of_copy"] == 192 / row["seconds"]
+    assert row["rate"] == 16 / row["seconds"]
+    broken = gpu.measure(case._replace(arguments=(square,)), limits, rounds=1)
+    assert broken["error"].startswith("TypeError")
+
+
+def test_colors_in_tf32_are_set_beside_full_ones():
+    limits = {name: {"value": 1.0, "unit": "B/s"} for name in ("copy", "read", "float32", "tf32")}
+    full, row = {}, {}
+    for scale, precision in ((1.0, "float32"), (1.5, "tf32")):
+        case = _gpu_cases.Case(
+            "colors", lambda x: x, (jnp.full(3, scale),), 3, "vertices", 1.0, precision=precision
+        )
+        row = gpu.measure(case, limits, rounds=1, full=full)
+    assert row["rms_off_full"] == 0.5
+    assert full == {}
+
+
+def test_the_data_sheet_is_found_by_the_device():
+    assert _gpu_limits.vendor("NVIDIA H200") == _gpu_limits.VENDOR["H200"]
+    assert _gpu_limits.vendor("cpu") is None
+
+
+@pytest.mark.slow
+def test_every_case_runs(tmp_path):
+    # In a process of its own, as at a user's: the session's strictness is not for it.
+    out = tmp_path / "gpu.json"
+    options = ["--sizes", "tiny", "--rounds", "1", "--out", str(out)]
+    tests = ["--test-seconds", "60", "--tests", "harmonics/test_indexing.py"]
+    command = [sys.executable, "-m", "benchmarks.gpu", *options, *tests]
+    said = subprocess.run(command, cwd=gpu.ROOT, stdout=subprocess.PIPE, text=True, check=True)
+    report = json.loads(said.stdout)
+    assert report == json.loads(out.read_text("utf-8"))
+    assert report["left_out"] == []
+    assert report["tests"]["passed"] > 0
+    names = [(row["case"], row["precision"]) for row in report["cases"]]
+    assert len(set(names)) == len(names) == 23
+    assert all(row["finite"] and row["seconds"] > 0 for row in report["cases"])
