@@ -24,7 +24,10 @@ def check_data(
     albedo: Float[ArrayLike, "..."],
     weights: Float[ArrayLike, "..."] | None,
 ) -> tuple[Float[Array, "v 3"], Float[Array, "..."], Float[Array, " v"]]:
-    """Converts observed, albedo and weights to the transfer's dtype; without weights, ones.
+    """Converts observed, albedo and weights to the transfer's dtype.
+
+    Without weights they are one, and zero at a point without a normal, as where a transfer is
+    filled up for several devices.
 
     Raises `ValueError` for shapes that do not fit, and, where values are known, for data that
     are not finite, all zero, or weighted by less than 0.
@@ -34,7 +37,8 @@ def check_data(
     observed = as_float(observed, "observed").astype(dtype)
     albedo = checked_albedo(albedo, count, dtype)
     weights = None if weights is None else as_float(weights, "weights").astype(dtype)
-    weights = jnp.ones(count, dtype) if weights is None else weights
+    if weights is None:
+        weights = jnp.any(transfer.normals != 0, axis=-1).astype(dtype)
     _check_shapes(observed, weights, count)
     _check_values(observed, weights)
     return observed, albedo, weights

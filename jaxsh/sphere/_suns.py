@@ -11,6 +11,7 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import as_float, check_degree, check_size
 from .._core.linalg import einsum
 from .._core.vectors import checked_rotation, components_first, normalize
+from .._core.xla import keep_rows
 from ..harmonics import convolve, disc, evaluate
 
 _RAYS = 16
@@ -156,10 +157,13 @@ def _placed(direction, local):
 @functools.partial(jax.jit, static_argnums=1)
 def _harmonics(suns: Suns, degree: int):
     if suns.shape is None:
+        light = suns.radiance
         spread = convolve(evaluate(suns.direction, degree), disc(suns.solid_angle, degree))
-        return einsum("sc,sk->ck", suns.radiance, spread.astype(suns.radiance.dtype))
-    spread = evaluate(suns.rays(), degree).mean(axis=1)
-    return einsum("sc,sk->ck", suns.irradiance, spread.astype(suns.radiance.dtype))
+    else:
+        light = suns.irradiance
+        spread = evaluate(suns.rays(), degree).mean(axis=1)
+    total = functools.partial(einsum, "sc,sk->ck")
+    return keep_rows(total, light, spread.astype(light.dtype), like=light, axis=0, out=None)
 
 
 @jax.jit

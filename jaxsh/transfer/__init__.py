@@ -10,6 +10,7 @@ from ._fixed_light import FixedLight, fixed_light
 from ._fixed_view import FixedView, fixed_view
 from ._material import Material
 from ._shade import reflected_direction, shade_diffuse, shade_glossy
+from ._sharded import shard_rows
 from ._sun import shade_sun
 from ._sun_visibility import SunVisibility, sun_visibility
 from ._transfer import (
@@ -42,6 +43,7 @@ __all__ = [
     "shade_diffuse",
     "shade_glossy",
     "shade_sun",
+    "shard_rows",
     "sun_visibility",
     "unshadowed",
 ]

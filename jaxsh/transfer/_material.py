@@ -5,8 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_finite, check_type, is_concrete
+from .._core.checks import as_finite, check_known, check_type, is_concrete
 from ..harmonics import degree_of
+from ._sharded import Devices, mesh_of, share, whole
 
 
 def _as_strong(name: str, least: float | None):
@@ -102,6 +103,20 @@ class Material(eqx.Module):
         if factor.ndim and scaled.ndim == 1:
             scaled = scaled[None]
         return cls(made.diffuse, scaled * factor, made.exponent)
+
+    def sharded(self, devices: Devices = None) -> "Material":
+        """Share what is given per vertex out over devices, as `shard_rows` does.
+
+        What all vertices share each device holds in full. Raises `ValueError` as it does.
+        """
+        check_known("material", self)
+        mesh = mesh_of(devices)
+        exponent = (share if self.exponent.ndim else whole)(self.exponent, mesh)
+        diffuse, specular = (
+            (share if albedo.ndim == 2 else whole)(albedo, mesh)
+            for albedo in (self.diffuse, self.specular)
+        )
+        return Material(diffuse, specular, exponent)
 
 
 def checked_light(

@@ -14,6 +14,7 @@ from .._core.checks import (
     as_float,
     as_host_float,
     check_finite,
+    check_known,
     check_size,
     check_type,
     is_concrete,
@@ -26,6 +27,7 @@ from ._bake._faults import check_arguments
 from ._bake._origins import origins
 from ._bake._receivers import unit_normals
 from ._glossy_kernels import unit
+from ._sharded import Devices, mesh_of, share, whole
 from ._transfer import SampledTransfer, Transfer
 
 Surface = Mesh | Transfer | SampledTransfer
@@ -40,8 +42,8 @@ class SunVisibility(eqx.Module):
 
     Made by `sun_visibility`, and taken by `shade_sun` in the place of a scene, as often as
     radiance, material or eye change. `seen` tells of the R rays to each source, `draw` which of
-    all rays to it the point takes; `direction` and `solid_angle` are the sources'. A pytree; shard
-    `seen` and `draw` by their rows. Visibility is a step: it is constant to derivatives.
+    all rays to it the point takes; `direction` and `solid_angle` are the sources'. A pytree.
+    Visibility is a step: it is constant to derivatives.
 
     **Example**
 
@@ -67,6 +69,17 @@ class SunVisibility(eqx.Module):
     def fraction(self) -> Float[Array, "v s"]:
         """The share of each source's rays that get out; those below the surface do not."""
         return jnp.mean(self.seen, axis=-1, dtype=self.solid_angle.dtype)
+
+    def sharded(self, devices: Devices = None) -> "SunVisibility":
+        """Share the points out over devices, as `Transfer.sharded` does; what fills up is dark."""
+        check_known("visibility", self)
+        mesh = mesh_of(devices)
+        return SunVisibility(
+            share(self.seen, mesh),
+            share(self.draw, mesh),
+            whole(self.direction, mesh),
+            whole(self.solid_angle, mesh),
+        )
 
 
 def sun_visibility(

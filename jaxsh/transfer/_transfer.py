@@ -15,6 +15,7 @@ from .._core.checks import (
     check_coefficients,
     check_degree,
     check_finite,
+    check_known,
     check_type,
 )
 from .._core.linalg import matmul, shading_matmul, shading_tall_product
@@ -28,6 +29,7 @@ from ._glossy_kernels import (
     reflected,
     rows_of,
 )
+from ._sharded import Devices, last_of, mesh_of, own_numbers, share, whole
 
 # Vertices side by side: a block's coefficients stay in the first cache.
 _BLOCK = 128
@@ -153,6 +155,23 @@ class Transfer(AbstractTransfer):
         )
         return Transfer(coefficients, positions, normals, self.neighbors)
 
+    def sharded(self, devices: Devices = None) -> "Transfer":
+        """Share the points out over devices (default: all), filled up as `shard_rows` does.
+
+        `num_points` grows to a multiple of the devices. A point that fills up has coefficients and
+        a normal of zero and the last point's position: it is black, and the fits of `inverse` skip
+        it. A transfer too large for one device is made on the host, under
+        `jax.default_device(jax.devices("cpu")[0])`. Raises `ValueError` as `shard_rows` does.
+        """
+        check_known("transfer", self)
+        mesh = mesh_of(devices)
+        return Transfer(
+            share(self.coefficients, mesh),
+            share(self.positions, mesh, filling=last_of(self.positions)),
+            share(self.normals, mesh),
+            share(self.neighbors, mesh, filling=own_numbers(self.neighbors)),
+        )
+
     def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
         return _irradiances(self.coefficients, lights)
 
@@ -208,6 +227,17 @@ class SampledTransfer(AbstractTransfer):
     @property
     def dtype(self) -> jnp.dtype:
         return self.coefficients.dtype
+
+    def sharded(self, devices: Devices = None) -> "SampledTransfer":
+        """Share the points out over devices, as `Transfer.sharded` does."""
+        check_known("transfer", self)
+        mesh = mesh_of(devices)
+        return SampledTransfer(
+            share(self.samples, mesh, axis=2),
+            share(self.coefficients, mesh),
+            share(self.positions, mesh, axis=1, filling=last_of(self.positions.T)),
+            share(self.normals, mesh, axis=1),
+        )
 
     def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
         return _irradiances(self.coefficients, lights)
@@ -267,6 +297,14 @@ class QuantizedTransfer(AbstractTransfer):
     @property
     def degree(self) -> int:
         return degree_of(len(self.scales))
+
+    def sharded(self, devices: Devices = None) -> "QuantizedTransfer":
+        """Share the points out over devices, as `Transfer.sharded` does, in a single block."""
+        check_known("transfer", self)
+        mesh = mesh_of(devices)
+        flat = jnp.moveaxis(self.codes, 0, 1).reshape(1, len(self.scales), -1)
+        codes = share(flat[..., : self.num_points], mesh, axis=2)
+        return QuantizedTransfer(codes, whole(self.scales, mesh), 0)
 
     def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
         width = lights.shape[1]

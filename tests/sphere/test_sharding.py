@@ -7,6 +7,7 @@ import functools
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 from jax.sharding import PartitionSpec as P
 from sharding import ROWS, WHOLE, check_sharded
@@ -107,6 +108,21 @@ def test_pictures(rng):
     for spec in (ROWS, SECOND):
         project = functools.partial(sphere.project_lat_long, degree=2)
         check_sharded(project, (image,), (spec,), WHOLE, mapped=False, exchange=SUM)
+
+
+def test_suns(rng):
+    suns = sphere.Suns(rng.normal(size=(4, 3)), rng.uniform(0.01, 0.1, 4), rng.normal(size=(4, 3)))
+    turn = np.eye(3)[[1, 2, 0]]
+
+    def everything(suns, turn):
+        return suns.rotate(turn).harmonics(1), suns.rays(3), suns.rotate(turn).direction
+
+    def mapped(*arguments):
+        light, *rest = everything(*arguments)
+        return jax.lax.psum(light, "rows"), *rest
+
+    out = WHOLE, ROWS, ROWS
+    check_sharded(everything, (suns, turn), (ROWS, WHOLE), out, mapped=mapped, exchange=SUM)
 
 
 def test_no_loop_off_the_cpu():

@@ -132,6 +132,7 @@ def test_its_gradient_in_the_normals(frame):
 def test_samples(frame):
     made = frame[1]
     check_sharded(sample, (made,), (ROWS,), specs_of(sample(made), SAMPLED))
+    check_sharded(lambda made: made.truncated(0).astype(np.float64), (made,), (ROWS,), ROWS)
 
 
 def test_fixed_views(frame):

@@ -26,6 +26,10 @@ def calls():
             normals=floats(V, 3),
             neighbors=np.zeros((V, 2), np.int32),
         ),
+        "Material.sharded": of(material().sharded, devices=None, host=True),
+        "SampledTransfer.sharded": of(t.sample(made()).sharded, devices=None, host=True),
+        "QuantizedTransfer.sharded": of(t.quantize(made()).sharded, devices=None, host=True),
+        "Transfer.sharded": of(made().sharded, devices=None, host=True),
         "Transfer.truncated": of(made().truncated, degree=1),
         "FixedLight.__call__": of(
             t.fixed_light(light, made()), eye=eye(), material=material(), **flags, finite="eye"
@@ -113,6 +117,7 @@ def calls():
             **flags,
             finite="eye",
         ),
+        "shard_rows": of(t.shard_rows, values=floats(V, 3), devices=None, host=True, free="values"),
         "sun_visibility": of(
             t.sun_visibility,
             suns=suns,
