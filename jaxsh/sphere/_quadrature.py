@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._core.checks import as_float, check_size
+from .._core.checks import as_float, check_known, check_size
+from .._core.devices import Devices, last_of, mesh_of, share
 from ..harmonics._tables import exact_grid
 
 
@@ -36,6 +37,27 @@ class Quadrature(eqx.Module):
                 f"expected directions (N, 3) and weights (N,), got shapes "
                 f"{self.directions.shape} and {self.weights.shape}"
             )
+
+    def sharded(self, devices: Devices = None) -> "Quadrature":
+        """Share the directions out over devices, as `transfer.shard_rows` does its rows.
+
+        A direction that fills up is the last one again, with a weight of zero. The values (C, N)
+        to `project` follow by `shard_rows(values.T, devices).T`.
+
+        **Example**
+
+        >>> import jax
+        >>> from jaxsh import sphere
+        >>> shared = sphere.fibonacci(101).sharded(jax.devices()[:1])
+        >>> shared.directions.sharding.spec
+        P('rows',)
+        """
+        check_known("quadrature", self)
+        mesh = mesh_of(devices)
+        return Quadrature(
+            share(self.directions, mesh, filling=last_of(self.directions)),
+            share(self.weights, mesh),
+        )
 
 
 def gauss_legendre(degree: int) -> Quadrature:

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import as_finite, check_known, check_type, is_concrete
+from .._core.devices import Devices, mesh_of, share, whole
 from ..harmonics import degree_of
-from ._sharded import Devices, mesh_of, share, whole
 
 
 def _as_strong(name: str, least: float | None):

@@ -19,6 +19,7 @@ from .._core.checks import (
     check_type,
     is_concrete,
 )
+from .._core.devices import Devices, mesh_of, share, whole
 from .._core.host import cores
 from ..geometry import Mesh, RayScene, ray_scene
 from ..sphere import Suns
@@ -27,7 +28,6 @@ from ._bake._faults import check_arguments
 from ._bake._origins import origins
 from ._bake._receivers import unit_normals
 from ._glossy_kernels import unit
-from ._sharded import Devices, mesh_of, share, whole
 from ._transfer import SampledTransfer, Transfer
 
 Surface = Mesh | Transfer | SampledTransfer

@@ -18,6 +18,7 @@ from .._core.checks import (
     check_known,
     check_type,
 )
+from .._core.devices import Devices, last_of, mesh_of, own_numbers, share, whole
 from .._core.linalg import matmul, shading_matmul, shading_tall_product
 from .._core.xla import materialize, on_mesh
 from ..harmonics import degree_of, num_coefficients
@@ -29,7 +30,6 @@ from ._glossy_kernels import (
     reflected,
     rows_of,
 )
-from ._sharded import Devices, last_of, mesh_of, own_numbers, share, whole
 
 # Vertices side by side: a block's coefficients stay in the first cache.
 _BLOCK = 128

@@ -37,6 +37,17 @@ def test_samples_over_directions(count, rng):
     check_sharded(project, samples, specs, WHOLE, mapped=summed(project), exchange=SUM)
 
 
+def test_a_quadrature_filled_up_for_two_devices(rng):
+    quadrature = sphere.Quadrature(rng.normal(size=(33, 3)), rng.uniform(1, 2, 33))
+    values = rng.normal(size=(2, 33))
+    shared = quadrature.sharded(jax.devices()[:2])
+    filled = np.concatenate([values, np.full((2, 1), 7.0)], axis=1)  # counts nothing
+    found = sphere.project(filled, shared, 2)
+    expected = sphere.project(values, quadrature, 2)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+    assert len(shared.weights.sharding.device_set) == 2
+
+
 def test_samples_of_many_functions(rng):
     directions, weights = rng.normal(size=(5, 3)), rng.uniform(1, 2, 5)
     arguments = rng.normal(size=(COUNT, 5)), directions, weights

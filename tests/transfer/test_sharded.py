@@ -15,8 +15,8 @@ V, W, DEGREE = 33, 34, 2
 DEVICES = jax.devices()[:2]
 OVER = {
     "list": DEVICES,
-    "auto": Mesh(np.array(DEVICES), ("points",)),
-    "explicit": Mesh(np.array(DEVICES), ("points",), axis_types=(AxisType.Explicit,)),
+    "auto": Mesh(np.array(DEVICES), ("rows",)),
+    "explicit": Mesh(np.array(DEVICES), ("rows",), axis_types=(AxisType.Explicit,)),
 }
 
 
@@ -45,7 +45,7 @@ def test_what_fills_up_sees_nothing(made):
     for name in ("coefficients", "positions", "normals", "neighbors"):
         array = getattr(shared, name)
         np.testing.assert_array_equal(array[:V], getattr(made, name))
-        assert array.sharding.is_equivalent_to(NamedSharding(OVER["auto"], P("points")), 2)
+        assert array.sharding.is_equivalent_to(NamedSharding(OVER["auto"], P("rows")), 2)
         assert array.dtype == getattr(made, name).dtype
     assert not np.any(shared.coefficients[V:])
     assert not np.any(shared.normals[V:])
@@ -59,7 +59,7 @@ def check_same(function, shared, plain):
     assert not collectives(compiled)
     colors, expected = compiled(*shared), function(*plain)
     assert colors.shape == (W, 3)
-    assert tuple(colors.sharding.spec)[:1] == ("points",)
+    assert tuple(colors.sharding.spec)[:1] == ("rows",)
     # Of colors up to 2, by sums in another order.
     np.testing.assert_allclose(np.asarray(colors)[:V], expected, rtol=0, atol=1e-6)
     assert not np.asarray(colors)[V:].any()

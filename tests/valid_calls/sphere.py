@@ -15,6 +15,7 @@ def calls():
         "Quadrature": of(
             s.Quadrature, directions=np.asarray(quadrature.directions), weights=floats(7)
         ),
+        "Quadrature.sharded": of(quadrature.sharded, devices=None, host=True),
         "Suns": of(
             s.Suns,
             direction=floats(2, 3),

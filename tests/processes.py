@@ -1,0 +1,56 @@
+"""What is computed on devices of one process, or of several that `jax.distributed` joins."""
+
+import sys
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.experimental import multihost_utils
+
+from jaxsh import inverse, sphere, transfer
+
+V, DEGREE = 33, 2
+EYE = np.array([0.3, -2.0, 1.5])
+
+
+def compute(devices) -> dict[str, np.ndarray]:
+    """Shading, projections, a fit and gradients of points that the devices share, as a whole."""
+    rng = np.random.default_rng(17)
+    normals = np.asarray(sphere.fibonacci(V).directions)
+    made = transfer.unshadowed(0.3 * normals, normals, DEGREE).sharded(devices)
+    light, albedo = rng.normal(size=(3, 9)), rng.uniform(0.1, 1, (V, 3))
+    material = transfer.Material(albedo, 0.3, rng.uniform(1, 9, V)).sharded(devices)
+    rows, colors = (transfer.shard_rows(x, devices) for x in (albedo, rng.uniform(0.1, 1, (V, 3))))
+
+    def loss(light, coefficients, made, rows):
+        shown = transfer.Transfer(coefficients, made.positions, made.normals, made.neighbors)
+        return jnp.sum((transfer.shade_diffuse(light, shown, rows) - 0.3) ** 2)
+
+    slopes = jax.jit(jax.grad(loss, (0, 1)))(jnp.asarray(light), made.coefficients, made, rows)
+    quadrature = sphere.fibonacci(V).sharded(devices)
+    project = jax.jit(lambda values, quadrature: sphere.project(values.T, quadrature, DEGREE))
+    found = inverse.fit_light(colors, made, rows, 1, prior=None)
+    results = {
+        "diffuse": transfer.shade_diffuse(light, made, rows),
+        "glossy": transfer.shade_glossy(light, made, EYE, material),
+        "projection": project(colors, quadrature),
+        "fit": found.value,
+        "deviation": found.confidence.deviation,
+        "slope in the light": slopes[0],
+        "slope in the coefficients": slopes[1],
+    }
+    return {name: _whole(array) for name, array in results.items()}
+
+
+def _whole(array: jax.Array) -> np.ndarray:
+    """All rows on each process, but for those that fill up."""
+    if not array.is_fully_addressable and not array.is_fully_replicated:
+        array = multihost_utils.process_allgather(array, tiled=True)
+    return np.asarray(array)[:V]
+
+
+if __name__ == "__main__":
+    address, number, path = sys.argv[1:]
+    jax.distributed.initialize(address, num_processes=2, process_id=int(number))
+    assert (jax.process_count(), jax.local_device_count()) == (2, 1)
+    np.savez(path, allow_pickle=False, **compute(None))
