@@ -115,9 +115,8 @@ def relative(a, b):
     return np.linalg.norm(a - b) / np.linalg.norm(b)
 
 
-@pytest.mark.parametrize(
-    ("resolution", "limit"), [(64, 0.03), pytest.param(256, 0.003, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("resolution", "limit"), [(64, 0.03), (256, 0.003)])
 def test_one_light_that_nothing_hides(resolution, limit):
     """Both forms against quadrature over the light: within 3 % at 64², 0.3 % at 256²."""
     light = rectangle([0.3, -0.2, 2], [0.6, 0.1, 0], [0, -0.5, 0.2])

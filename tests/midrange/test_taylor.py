@@ -54,7 +54,7 @@ def test_terms_are_the_texel_form_s_derivatives(rng):
     assert start == terms.shape[-1] == 10
 
 
-@pytest.mark.parametrize("order", [1, 3])
+@pytest.mark.parametrize("order", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_error_falls_with_the_offset_s_power(rng, order):
     cube = random_cube(rng)
     expansion = taylor(cube, DEGREE, order)

@@ -59,6 +59,7 @@ def test_stored_fits(sky_of):
         check_sharded(function, suns, (ROWS,) * 2, ROWS)
 
 
+@pytest.mark.slow
 def test_projection(sky_of):
     _, *suns = sky_of
     exact = functools.partial(sky.project_preetham, degree=1)

@@ -151,6 +151,7 @@ def test_fixed_views(frame):
     )
 
 
+@pytest.mark.slow
 def test_fixed_lights(frame):
     light, made, *_ = frame
     out = specs_of(fixed_light(light, made), STILL)
