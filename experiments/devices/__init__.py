@@ -1,0 +1,1 @@
+"""What devices cost and give: the precision of their products, and many of them at once."""
