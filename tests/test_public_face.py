@@ -84,7 +84,13 @@ REASONS = {
     },
     "sphere": dict.fromkeys(["cube_map", "fibonacci", "gauss_legendre", "lat_long"], NO_ARRAYS)
     | {"split_sun": HOST},
-    "transfer": {"bake": HOST, "load": NO_ARRAYS, "save": HOST, "sun_visibility": HOST},
+    "transfer": {
+        "bake": HOST,
+        "load": NO_ARRAYS,
+        "open": NO_ARRAYS,
+        "save": HOST,
+        "sun_visibility": HOST,
+    },
     "viewer": {"export_html": HOST, "view": HOST},
 }
 

@@ -11,6 +11,7 @@ from ._fixed_view import FixedView, fixed_view
 from ._material import Material
 from ._shade import reflected_direction, shade_diffuse, shade_glossy
 from ._sharded import shard_rows
+from ._stored import StoredTransfer, open
 from ._sun import shade_sun
 from ._sun_visibility import SunVisibility, sun_visibility
 from ._transfer import (
@@ -30,12 +31,14 @@ __all__ = [
     "Material",
     "QuantizedTransfer",
     "SampledTransfer",
+    "StoredTransfer",
     "SunVisibility",
     "Transfer",
     "bake",
     "fixed_light",
     "fixed_view",
     "load",
+    "open",
     "quantize",
     "reflected_direction",
     "sample",

@@ -2,23 +2,35 @@
 
 import functools
 import math
+from typing import overload
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, as_float, check_flag, check_type
 from ..harmonics import degree_of
 from ._glossy_kernels import lobe_polynomial, lobe_products, reflected
 from ._material import Material, checked_albedo, checked_eye, checked_light, checked_material
+from ._stored import StoredTransfer
+from ._streamed import streamed_diffuse, streamed_glossy
 from ._transfer import AbstractTransfer
+
+
+@overload
+def shade_diffuse(light, transfer: StoredTransfer, albedo) -> Float[np.ndarray, "... v 3"]: ...
+
+
+@overload
+def shade_diffuse(light, transfer: AbstractTransfer, albedo) -> Float[Array, "... v 3"]: ...
 
 
 def shade_diffuse(
     light: Float[ArrayLike, "... 3 k"],
-    transfer: AbstractTransfer,
+    transfer: AbstractTransfer | StoredTransfer,
     albedo: Float[ArrayLike, "..."],
-) -> Float[Array, "... v 3"]:
+) -> Float[Array | np.ndarray, "... v 3"]:
     """Compute the radiance albedo/π · Σ_k light_k T_k that leaves each of V diffuse vertices.
 
     **Arguments**
@@ -28,12 +40,14 @@ def shade_diffuse(
       place: (batch, 1, 3, K).
     - `transfer`: of the light's degree or above. A lower light is exact, since harmonics are
       orthogonal; a higher one raises, since its upper bands would be dropped silently. The result
-      of `quantize` takes less time and memory, and shared lights alone.
+      of `quantize` takes less time and memory, and shared lights alone. A `StoredTransfer` is read
+      block by block, the next while one is shaded.
     - `albedo`: a number, RGB (3,), or per vertex (V, 1) or (V, 3).
 
     **Returns** (..., V, 3), in the dtype of the transfer. Linear in light, coefficients and
     albedo, and differentiable in each, forward and reverse; the positions and normals of the
-    transfer do not enter.
+    transfer do not enter. For a `StoredTransfer` a NumPy array, without derivatives and outside
+    `jit`.
 
     Raises `ValueError` for shapes that do not fit, and for a light or an albedo that is at hand
     (`docs/conventions.md`) and not finite, or an albedo below 0.
@@ -48,10 +62,13 @@ def shade_diffuse(
     >>> color.shape, round(float(color[0, 0]), 4)
     ((1, 3), 0.25)
     """
-    check_type("transfer", transfer, AbstractTransfer)
+    check_type("transfer", transfer, AbstractTransfer, StoredTransfer)
     count, dtype = transfer.num_points, transfer.dtype
     light = checked_light(light, count, transfer.degree, dtype)
-    return _shade_diffuse(light, transfer, checked_albedo(albedo, count, dtype))
+    albedo = checked_albedo(albedo, count, dtype)
+    if isinstance(transfer, StoredTransfer):
+        return streamed_diffuse(_shade_diffuse, light, transfer, albedo)
+    return _shade_diffuse(light, transfer, albedo)
 
 
 @jax.jit
@@ -66,15 +83,27 @@ def _shade_diffuse(light, transfer, albedo):
     return jnp.multiply(*align(irradiance, albedo / math.pi))
 
 
+@overload
+def shade_glossy(
+    light, transfer: StoredTransfer, eye, material, *, distant=..., normalized=...
+) -> Float[np.ndarray, "... v 3"]: ...
+
+
+@overload
+def shade_glossy(
+    light, transfer: AbstractTransfer, eye, material, *, distant=..., normalized=...
+) -> Float[Array, "... v 3"]: ...
+
+
 def shade_glossy(
     light: Float[ArrayLike, "... 3 k"],
-    transfer: AbstractTransfer,
+    transfer: AbstractTransfer | StoredTransfer,
     eye: Float[ArrayLike, " 3"],
     material: Material,
     *,
     distant: bool = False,
     normalized: bool = True,
-) -> Float[Array, "... v 3"]:
+) -> Float[Array | np.ndarray, "... v 3"]:
     """Compute the radiance that V vertices send to the eye, reflected diffusely and glossily.
 
     Lee & Kim 2014, "Locally adaptive products", equations 2 to 6, with every function cut to the
@@ -97,7 +126,8 @@ def shade_glossy(
     - `transfer`: of the light's degree or above, cut to the light's. For frame after frame
       `sample` it at that degree once, which leaves little of the work. Where only the camera
       moves, `fixed_light` has computed R already; where only the light turns, `fixed_view` all
-      but the product with it.
+      but the product with it. A `StoredTransfer` is read block by block, the next while one is
+      shaded.
     - `eye`: a point, or with `distant` the direction, of any length, to an eye far away.
     - `material`: albedos and the lobe's exponent. The lobe is cut to the light's degree.
     - `normalized`: whether the lobe max(0, B·ω)^k is divided by its integral 2π/(k+1). Otherwise
@@ -113,7 +143,7 @@ def shade_glossy(
     the same formula's value, which nobody sees: B then points into the surface. Where the normal
     is zero or not finite, B is -ω_o; an eye on a vertex is taken to be above it. Linear in light
     and transfer, and differentiable in all arguments, forward and reverse; light that rings below
-    zero stays there.
+    zero stays there. For a `StoredTransfer` a NumPy array, without derivatives and outside `jit`.
 
     Raises `ValueError` for shapes that do not fit, for a sampled transfer of another degree than
     the light's, and for a light or an eye that is at hand (`docs/conventions.md`) and not finite.
@@ -129,11 +159,14 @@ def shade_glossy(
     >>> color.shape
     (1, 3)
     """
-    check_type("transfer", transfer, AbstractTransfer)
+    check_type("transfer", transfer, AbstractTransfer, StoredTransfer)
     count, dtype = transfer.num_points, transfer.dtype
     eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
     light = checked_light(light, count, transfer.degree, dtype)
     distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
+    if isinstance(transfer, StoredTransfer):
+        shade = functools.partial(_shade_glossy, distant=distant, normalized=normalized)
+        return streamed_glossy(shade, light, transfer, eye, material)
     form = transfer.glossy_form(degree_of(light.shape[-1]))
     return _shade_glossy(light, form, eye, material, distant, normalized)
 

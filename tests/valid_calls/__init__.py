@@ -59,5 +59,11 @@ MADE = {
     "imaging": {"Raster"},
     "midrange": {"Update", "Weights"},
     "sky": {"Axis", "FitError", "PreethamConstants", "SkyFit", "SkyWarning", "Solution"},
-    "transfer": {"AbstractTransfer", "QuantizedTransfer", "SampledTransfer", "SunVisibility"},
+    "transfer": {
+        "AbstractTransfer",
+        "QuantizedTransfer",
+        "SampledTransfer",
+        "StoredTransfer",
+        "SunVisibility",
+    },
 }

@@ -50,7 +50,7 @@ def calls():
             scene=None,
             seed=0,
             chunk=16,
-            store=None,
+            store="/dev/null/no/folder",
             finite="albedo ray_bias",
             free="store",
             slow=True,
@@ -66,6 +66,7 @@ def calls():
             finite="eye",
         ),
         "load": of(t.load, path="no such file", host=True),
+        "open": of(t.open, path="no such folder", host=True),
         "quantize": of(t.quantize, transfer=made()),
         "reflected_direction": of(
             t.reflected_direction,

@@ -1,0 +1,176 @@
+"""Transfer that stays on disk: opened, read block by block ahead of its use, or as a whole."""
+
+import dataclasses
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from .._core.checks import as_path
+from ..harmonics import degree_of
+from ._store import BlockStore
+from ._transfer import Transfer
+
+_ARRAYS = "coefficients", "positions", "normals", "neighbors"
+_Result = TypeVar("_Result")
+
+
+@dataclasses.dataclass(frozen=True)
+class StoredTransfer:
+    """Stands for the transfer in a store on disk, which may be larger than the memory.
+
+    Made by `open`. `shade_diffuse` and `shade_glossy` take it as they take a `Transfer`, and go
+    through its blocks, the next of which is read while one is shaded; `blocks` does so for any
+    other purpose, and `load` reads all.
+
+    **Example**
+
+    >>> import pathlib, tempfile
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import geometry, transfer
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "knot.zarr"
+    ...     baked = transfer.bake(geometry.knot(300), degree=1, directions=64, store=path)
+    ...     stored = transfer.open(path)
+    ...     colors = transfer.shade_diffuse(jnp.ones((3, 4)), stored, 0.5)
+    >>> stored.num_points, stored.degree, type(colors).__name__, colors.shape
+    (300, 1, 'ndarray', (300, 3))
+    """
+
+    path: Path
+    num_points: int
+    degree: int
+    dtype: np.dtype  # of the colors that it shades: float32 where JAX's x64 is off
+    block_rows: int  # vertices in a block; the last may have fewer
+    _store: BlockStore = dataclasses.field(repr=False, compare=False)
+
+    def blocks(self) -> Iterator[tuple[slice, Transfer]]:
+        """Give each block with the vertices that it holds, the next being read meanwhile.
+
+        Each is a `Transfer` of those vertices alone, on one of this process's devices in turn; its
+        neighbors are numbered within the block, and one in another block is the vertex itself.
+        Raises `ValueError` for a block that is missing or damaged.
+        """
+
+        def give(
+            rows: slice, coefficients: Array, positions: Array, normals: Array, neighbors: Array
+        ) -> tuple[slice, Transfer]:
+            made = Transfer(coefficients, positions, normals, neighbors)
+            return rows, made
+
+        yield from self._stream(_ARRAYS, give)
+
+    def load(self) -> Transfer:
+        """Read the whole transfer into memory; raises `ValueError` for a damaged block."""
+        coefficients, positions, normals, neighbors = map(self._store.whole, _ARRAYS)
+        return Transfer(
+            jnp.asarray(coefficients),
+            jnp.asarray(positions),
+            jnp.asarray(normals),
+            jnp.asarray(neighbors),
+        )
+
+    def shaded(
+        self, arrays: Sequence[str], shade: Callable[[slice, Transfer], Array]
+    ) -> np.ndarray:
+        """Put together the colors (..., V, 3) that a function gives for each block.
+
+        Only `arrays` are read; the others of the transfers are zero.
+        """
+        colors = None
+
+        def give(rows: slice, *read: Array) -> tuple[slice, Array]:
+            held = dict(zip(arrays, read, strict=True))
+            left = jnp.zeros((len(read[0]), 3), read[0].dtype)
+            positions, normals = held.get("positions", left), held.get("normals", left)
+            neighbors = jnp.zeros((len(left), 0), jnp.int32)
+            return rows, shade(rows, Transfer(held["coefficients"], positions, normals, neighbors))
+
+        for rows, part in self._stream(arrays, give):
+            if colors is None:
+                colors = np.empty((*part.shape[:-2], self.num_points, 3), part.dtype)
+            colors[..., rows, :] = part
+        assert colors is not None
+        return colors
+
+    def _stream(
+        self, arrays: Sequence[str], use: Callable[..., tuple[slice, _Result]]
+    ) -> Iterator[tuple[slice, _Result]]:
+        """Give what a function makes of each block's arrays, in order.
+
+        Of each device's blocks one is used while the next is read: no third is in memory.
+        """
+        devices = jax.local_devices()
+
+        def read(block: int) -> list[np.ndarray]:
+            rows = self._store.rows(block)
+            return [self._local(name, rows, self._store.read(name, block)) for name in arrays]
+
+        count, ahead = self._store.num_blocks, len(devices)
+        with ThreadPoolExecutor(ahead) as pool:
+            reading = deque(pool.submit(read, block) for block in range(min(ahead, count)))
+            used: deque[tuple[slice, _Result]] = deque()
+            try:
+                for block in range(count):
+                    host = reading.popleft().result()
+                    if len(used) == ahead:
+                        yield jax.block_until_ready(used.popleft())
+                    if block + ahead < count:
+                        reading.append(pool.submit(read, block + ahead))
+                    here = jax.device_put(host, devices[block % ahead])
+                    used.append(use(self._store.rows(block), *here))
+                    del host, here
+                yield from used
+            finally:
+                pool.shutdown(wait=True, cancel_futures=True)
+
+    def _local(self, name: str, rows: slice, values: np.ndarray) -> np.ndarray:
+        if name == "neighbors":
+            own = np.arange(len(values), dtype=values.dtype)[:, None]
+            values = values - values.dtype.type(rows.start)
+            return np.where((values >= 0) & (values < len(values)), values, own)
+        return values.astype(jax.dtypes.canonicalize_dtype(values.dtype), copy=False)
+
+
+def open(path: str | os.PathLike[str]) -> StoredTransfer:
+    """Open the store that `bake` wrote, without reading the transfer itself.
+
+    Raises `FileNotFoundError` where nothing is there, and `ValueError`, naming the path and the
+    problem, for another thing, a newer version, and a bake that is not finished. Blocks whose bytes
+    are wrong are found when they are read. Runs on the host.
+
+    **Example**
+
+    >>> import pathlib, tempfile
+    >>> from jaxsh import geometry, transfer
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "knot.zarr"
+    ...     baked = transfer.bake(geometry.knot(300), degree=1, shadows=False, store=path)
+    ...     bool((transfer.open(path).load().coefficients == baked.coefficients).all())
+    True
+    """
+    path = as_path(path)
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: there is no such transfer store")
+    store = BlockStore(path, read_only=True)
+    for name in _ARRAYS:
+        if missing := store.missing(name):
+            raise ValueError(
+                f"{path}: not finished: {len(missing)} of {store.num_blocks} blocks of {name} are "
+                "missing or cut off; bake into it again with the same arguments"
+            )
+    return StoredTransfer(
+        path=path,
+        num_points=store.num_points,
+        degree=degree_of(store.width),
+        dtype=np.dtype(jax.dtypes.canonicalize_dtype(store.dtype)),
+        block_rows=store.block_rows,
+        _store=store,
+    )

@@ -1,0 +1,61 @@
+"""Shading of a transfer on disk, block by block."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._core.checks import check_known
+from ._material import Material
+from ._stored import StoredTransfer
+from ._transfer import Transfer
+
+
+def streamed_diffuse(
+    shade: Callable[..., Array],
+    light: Float[Array, "..."],
+    transfer: StoredTransfer,
+    albedo: Float[Array, "..."],
+) -> Float[np.ndarray, "... v 3"]:
+    """Shade each block by `shade(light, transfer, albedo)`; the arguments are checked."""
+    lights, albedos = _on_host("light", light), _on_host("albedo", albedo)
+
+    def of(rows: slice, block: Transfer) -> Array:
+        return shade(_own(lights, rows), block, albedos[rows] if albedos.ndim == 2 else albedos)
+
+    return transfer.shaded(("coefficients",), of)
+
+
+def streamed_glossy(
+    shade: Callable[..., Array],
+    light: Float[Array, "..."],
+    transfer: StoredTransfer,
+    eye: Float[Array, " 3"],
+    material: Material,
+) -> Float[np.ndarray, "... v 3"]:
+    """Shade each block by `shade(light, transfer, eye, material)`; the arguments are checked."""
+    lights, place = _on_host("light", light), _on_host("eye", eye)
+    diffuse = _on_host("material", material.diffuse)
+    specular = _on_host("material", material.specular)
+    exponent = _on_host("material", material.exponent)
+
+    def of(rows: slice, block: Transfer) -> Array:
+        own = Material(
+            diffuse[rows] if diffuse.ndim == 2 else diffuse,
+            specular[rows] if specular.ndim == 2 else specular,
+            exponent[rows] if exponent.ndim else exponent,
+        )
+        return shade(_own(lights, rows), block, place, own)
+
+    return transfer.shaded(("coefficients", "positions", "normals"), of)
+
+
+def _on_host(name: str, array: Array) -> np.ndarray:
+    # From there it goes to whichever device has the block.
+    check_known(name, array)
+    return np.asarray(array)
+
+
+def _own(lights: np.ndarray, rows: slice) -> np.ndarray:
+    one_each = lights.ndim > 2 and lights.shape[-3] != 1
+    return lights[..., rows, :, :] if one_each else lights
