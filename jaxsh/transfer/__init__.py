@@ -4,7 +4,7 @@
 follows is a product of coefficients, for any light, and differentiates.
 """
 
-from ._bake import bake
+from ._bake import bake, bake_on
 from ._file import load, save
 from ._fixed_light import FixedLight, fixed_light
 from ._fixed_view import FixedView, fixed_view
@@ -35,6 +35,7 @@ __all__ = [
     "SunVisibility",
     "Transfer",
     "bake",
+    "bake_on",
     "fixed_light",
     "fixed_view",
     "load",

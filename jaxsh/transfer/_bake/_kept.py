@@ -59,15 +59,15 @@ class BakeStore(BlockStore):
         """Count the passes of the bake over the vertices."""
         return 1 + self.attributes["arguments"]["bounces"]
 
-    def job(self, scene: RayScene | None = None) -> Job:
-        """Build the job from what is stored; by default the mesh is the scene."""
+    def job(self, scene: RayScene | None = None, *, threads: int | None = None) -> Job:
+        """Build the job from what is stored; by default the mesh is the scene, by `threads`."""
         albedo = self.whole("albedo")
         arguments = BakeArguments.restored(
-            self.attributes["arguments"], albedo if len(albedo) > 1 else albedo[0]
+            self.attributes["arguments"], albedo if len(albedo) > 1 else albedo.reshape(())
         )
         mesh = self.mesh()
         if scene is None and arguments.shadows:
-            scene = geometry.ray_scene(mesh)
+            scene = geometry.ray_scene(mesh, threads=threads)
         prepared = Prepared(self.whole("unit_normals"), self.whole("origins"))
         return Job(mesh, arguments, scene, prepared)
 

@@ -1,0 +1,217 @@
+"""A bake on a cluster: Dask's workers fill a store, block by block."""
+
+import contextlib
+import itertools
+import operator
+import os
+import uuid
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from jaxtyping import ArrayLike, Float, Int
+
+from ..._core.checks import as_host_float, as_path, check_degree, check_size
+from ..._core.host import cores
+from ..._core.words import reason
+from ...geometry import Mesh, ray_scene
+from ._blind import why_blind
+from ._faults import check_arguments, faults
+from ._job import BakeArguments, Job, Prepared
+from ._kept import BakeStore, refuse
+from ._origins import origins
+from ._passes import progress_bar
+from ._receivers import unit_normals
+from ._worker import Task, let_go
+
+# Blocks in the scheduler's hands at once: enough for thousands of workers, and for a bake of any
+# size little of its memory.
+_AHEAD = 4096
+# A cluster or client of our own serves no web page.
+_PLAIN: Any = {"dashboard_address": None}
+
+
+def bake_on(
+    client: Any,
+    mesh: Mesh,
+    degree: int,
+    *,
+    store: str | os.PathLike[str],
+    directions: int = 2048,
+    shadows: bool = True,
+    bounces: int = 0,
+    albedo: Float[ArrayLike, "*v"] = 0.5,
+    ray_bias: float | None = None,
+    offset: float | None = None,
+    seed: int = 0,
+    chunk: int = 256,
+    progress: bool = True,
+) -> BakeStore:
+    """Bake into a store on the workers of a Dask cluster, many machines if need be.
+
+    A task is a block of vertices, whose coefficients a worker writes to the store by itself; the
+    scheduler sees nothing but their numbers. A worker reads what it needs from the store and
+    builds the tree of the mesh once. So a worker may die and others come at any time: what it was
+    at is done again. After any end of this call, the same call goes on with what is missing or
+    damaged, and so does `bake(..., store=...)`, to the same bits (on processors of one kind).
+
+    **Arguments**
+
+    - `client`: a `distributed.Client`, the address of a scheduler, or None for workers of its own
+      on this machine: one process with a thread a core.
+    - `store`: a folder that this process and all workers see under one path.
+    - `chunk`: vertices at a time on each thread of a worker, rounded up to a multiple of 64.
+    - `progress`: shows a bar when standard error is a terminal and the bake takes over a second.
+    - all others: as for `bake`. There is no `scene`: the mesh alone stops rays.
+
+    **Returns** the `StoredTransfer` that `transfer.open` gives. Nothing of the size of its
+    coefficients is ever in the memory of this process. A worker process holds the mesh's tree,
+    about 0.2 KB a vertex, and for bounces the coefficients before them: give a machine one process
+    of many threads rather than many of one.
+
+    Workers need this version of jaxsh. Where there are none, the call waits for some. A block
+    fails for good where four workers died of it, as of too little memory. One `UserWarning` counts
+    vertices without light, as in `bake`.
+
+    Raises `ImportError` without the package `distributed` (the extra `scale`), `ConnectionError`
+    where the scheduler cannot be reached or goes away, `RuntimeError` for a block that workers
+    die of, `OSError` where a worker cannot write, and `ValueError` and `TypeError` as `bake` does.
+
+    **Example**
+
+    >>> import tempfile
+    >>> from distributed import Client
+    >>> from jaxsh import geometry, transfer
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> with Client(processes=False, dashboard_address=None) as client:
+    ...     stored = transfer.bake_on(
+    ...         client, geometry.knot(300), 2, directions=64, store=f"{folder.name}/knot"
+    ...     )
+    >>> stored.num_points, stored.degree
+    (300, 2)
+    """
+    path = as_path(store, "store").absolute()
+    degree, seed = check_degree(degree), check_size("seed", seed, least=0)
+    check_arguments(mesh, directions, shadows, bounces, albedo, ray_bias, offset, chunk)
+    arguments = BakeArguments(
+        degree=degree,
+        directions=operator.index(directions),
+        shadows=bool(shadows),
+        bounces=operator.index(bounces),
+        albedo=as_host_float(albedo, "albedo"),
+        ray_bias=None if ray_bias is None else float(ray_bias),
+        offset=None if offset is None else float(offset),
+        seed=seed,
+    )
+    identity = arguments.identity(mesh)
+    refuse(path, identity)
+    normals = unit_normals(mesh)
+    with _connected(client) as connected:
+        start = origins(mesh, normals, ray_scene(mesh), ray_bias, offset) if shadows else None
+
+        def why(blind: Int[np.ndarray, " n"]) -> list[str]:
+            assert start is not None  # without shadows no vertex is blind
+            return why_blind(mesh, ray_scene(mesh), blind, normals, start)
+
+        positions = np.asarray(mesh.vertices) if start is None else start.positions
+        # Without a scene: the workers have theirs.
+        job = Job(mesh, arguments, None, Prepared(normals, positions))
+        kept = BakeStore.of(path, mesh, job, identity)
+        if not kept.finished:
+            blind = _fill(connected, kept, identity, chunk, progress)
+            kept.finish(faults(mesh, normals, blind, why))
+    if said := kept.attributes["warning"]:
+        warnings.warn(said, UserWarning, stacklevel=2)
+    return BakeStore(path)
+
+
+@contextlib.contextmanager
+def _connected(client: Any) -> Iterator[Any]:
+    """Give a client; what is started here, a cluster or a connection, is ended here."""
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise ImportError(
+            "bake_on needs the package distributed: pip install 'jaxsh[scale]'"
+        ) from error
+    if client is None:
+        with (
+            LocalCluster(n_workers=1, threads_per_worker=cores(), **_PLAIN) as cluster,
+            Client(cluster) as own,
+        ):
+            yield own
+    elif isinstance(client, str):
+        try:
+            own = Client(client)
+        except (OSError, ValueError) as error:
+            raise ConnectionError(f"bake_on: no scheduler at {client}: {reason(error)}") from error
+        with own:
+            yield own
+    elif isinstance(client, Client):
+        if client.asynchronous:
+            raise TypeError("expected a client that waits, got one with asynchronous=True")
+        yield client
+    else:
+        raise TypeError(
+            "expected client as a distributed.Client, an address or None, got "
+            f"{type(client).__name__}"
+        )
+
+
+def _fill(
+    client: Any, kept: BakeStore, identity: dict[str, Any], chunk: int, progress: bool
+) -> Int[np.ndarray, " n"]:
+    """Fill all passes of a store; gives the vertices that have a normal and see nothing."""
+    blind = np.zeros(kept.num_points, bool)
+    with progress_bar(kept.passes * kept.num_points, progress) as bar:
+        for number in range(kept.passes):
+            task = Task(str(kept.path), identity, number, chunk)
+            for block, found in _answers(client, task, kept.num_blocks):
+                part = kept.rows(block)
+                count = part.stop - part.start
+                if found is not None:
+                    blind[part] = np.unpackbits(np.frombuffer(found, np.uint8), count=count)
+                bar.update(count)
+    with contextlib.suppress(OSError):
+        client.run(let_go, on_error="ignore")
+    return np.flatnonzero(blind)
+
+
+def _answers(client: Any, task: Task, blocks: int) -> Iterator[tuple[int, bytes | None]]:
+    """Run a task for each block and yield blocks and answers as they come."""
+    from concurrent.futures import CancelledError
+
+    from distributed import KilledWorker, as_completed
+    from distributed.comm.core import CommClosedError
+
+    waiting, name = iter(range(blocks)), f"bake-{uuid.uuid4().hex}-{task.number}"
+    running: dict[Any, int] = {}
+    finished = as_completed()
+
+    def submit(most: int) -> None:
+        for block in itertools.islice(waiting, most):
+            future = client.submit(task, block, key=f"{name}-{block}", pure=False)
+            running[future] = block
+            finished.add(future)
+
+    try:
+        submit(_AHEAD)
+        for future in finished:
+            answer = future.result()
+            yield running.pop(future), answer
+            submit(1)
+    except (CommClosedError, CancelledError, TimeoutError) as error:
+        running.clear()  # to cancel them would wait for the scheduler
+        raise ConnectionError(
+            f"bake_on: the scheduler went away, or dropped the tasks ({reason(error)}): what is "
+            f"written stays in {task.path}, and the same call goes on from there"
+        ) from error
+    except KilledWorker as error:
+        raise RuntimeError(
+            f"bake_on: a block of {task.path} was given up, as each worker that had it died, "
+            "perhaps of too little memory; other blocks stay, and the same call goes on from there"
+        ) from error
+    finally:
+        if running:
+            client.cancel(list(running))

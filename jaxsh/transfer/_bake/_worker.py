@@ -1,0 +1,94 @@
+"""What a worker of a cluster does: bakes blocks into a store that it reads all else from."""
+
+import os
+import socket
+import threading
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from .._store import DamagedError
+from ._gather import TILE
+from ._kept import BakeStore
+
+
+class Task(NamedTuple):
+    """Bakes a block on a worker, and tells which of its vertices see nothing."""
+
+    path: str
+    identity: dict[str, Any]
+    number: int  # of the pass
+    chunk: int
+
+    def __call__(self, block: int) -> bytes | None:
+        held = _hold(self.path, self.identity)
+        kept, part = held.kept, held.kept.rows(block)
+        try:
+            rows = kept.read_pass(self.number, block)
+        except DamagedError:
+            rows = held.bake(self.number, block, self.chunk)
+            kept.write_pass(self.number, block, rows)
+        blind = ~rows.any(axis=1) & held.job.prepared.normals[part].any(axis=1)
+        return np.packbits(blind).tobytes() if self.number == 0 and blind.any() else None
+
+
+class _Held:
+    """Keeps in a worker process what all blocks of a bake need."""
+
+    def __init__(self, path: str, identity: dict[str, Any]):
+        if not os.path.isdir(path):
+            raise ValueError(
+                f"{path}: not there for the worker on {socket.gethostname()}: the store must be a "
+                "folder that this process and all workers see under one path"
+            )
+        self.kept = BakeStore(Path(path))
+        if self.kept.attributes["arguments"] != identity:
+            raise ValueError(f"{path}: another bake took the place of this one's store")
+        self.job = self.kept.job(threads=1)
+        # All vertices' coefficients before the bounces of pass `_number`.
+        self._before, self._number = np.empty((0, self.job.width), self.job.dtype), 0
+        self._lock = threading.Lock()
+
+    def bake(self, number: int, block: int, chunk: int) -> Float[np.ndarray, "rows k"]:
+        """Compute a block of a pass, `chunk` vertices at a time."""
+        before, direct = None, None
+        if number:
+            before, direct = self._all_before(number), self.kept.read_pass(0, block)
+        part = self.kept.rows(block)
+        rows = np.empty((part.stop - part.start, self.job.width), self.job.dtype)
+        size = -(-chunk // TILE) * TILE
+        for start in range(0, len(rows), size):
+            at = slice(start, min(start + size, len(rows)))
+            whole = slice(part.start + at.start, part.start + at.stop)
+            rows[at] = self.job.rows(number, whole, before, None if direct is None else direct[at])
+        return rows
+
+    def _all_before(self, number: int) -> Float[np.ndarray, "v k"]:
+        """Read the pass before, once for all threads."""
+        with self._lock:
+            if self._number != number:
+                self._before = self._before[:0].copy()  # its memory first
+                self._before, self._number = self.kept.whole_pass(number - 1), number
+            return self._before
+
+
+# One bake at a time in a process: its tree may take most of the memory.
+_held: dict[str, Any] = {}
+_building = threading.Lock()
+
+
+def _hold(path: str, identity: dict[str, Any]) -> _Held:
+    """Give what this process keeps of a bake, read and built by the first thread that asks."""
+    with _building:
+        if _held.get("key") != (path, identity):
+            _held.clear()
+            _held.update(held=_Held(path, identity), key=(path, identity))
+        return _held["held"]
+
+
+def let_go() -> None:
+    """Free what this process keeps of a bake."""
+    with _building:
+        _held.clear()
