@@ -86,6 +86,7 @@ REASONS = {
     | {"split_sun": HOST},
     "transfer": {
         "bake": HOST,
+        "bake_on": HOST,
         "load": NO_ARRAYS,
         "open": NO_ARRAYS,
         "save": HOST,

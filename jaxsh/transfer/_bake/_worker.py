@@ -1,4 +1,4 @@
-"""What a worker of a cluster does: bakes blocks into a store that it reads all else from."""
+"""The workers of a bake on a cluster: blocks into a store that all else is read from."""
 
 import os
 import socket
