@@ -84,10 +84,10 @@ def bake_on(
     >>> from distributed import Client
     >>> from jaxsh import geometry, transfer
     >>> folder = tempfile.TemporaryDirectory()
-    >>> with Client(processes=False, dashboard_address=None) as client:
-    ...     stored = transfer.bake_on(
-    ...         client, geometry.knot(300), 2, directions=64, store=f"{folder.name}/knot"
-    ...     )
+    >>> client = Client(processes=False, dashboard_address=None)
+    >>> mesh = geometry.knot(300)
+    >>> with folder as path, client:
+    ...     stored = transfer.bake_on(client, mesh, 2, directions=64, store=f"{path}/knot")
     >>> stored.num_points
     300
     """
