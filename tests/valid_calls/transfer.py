@@ -57,7 +57,7 @@ def calls():
         ),
         "bake_on": of(
             t.bake_on,
-            client=None,
+            client="tcp://nowhere",
             mesh=knot(),
             degree=1,
             store="/dev/null/no/knot",

@@ -106,6 +106,7 @@ def bake_on(
     )
     identity = arguments.identity(mesh)
     refuse(path, identity)
+    path.parent.mkdir(parents=True, exist_ok=True)  # or fails before all work
     normals = unit_normals(mesh)
     with _connected(client) as connected:
         start = origins(mesh, normals, ray_scene(mesh), ray_bias, offset) if shadows else None
