@@ -16,6 +16,7 @@ from ..._core.checks import as_host_float, as_path, check_degree, check_size
 from ..._core.host import cores
 from ..._core.words import reason
 from ...geometry import Mesh, ray_scene
+from .._stored import StoredTransfer, open
 from ._blind import why_blind
 from ._faults import check_arguments, faults
 from ._job import BakeArguments, Job, Prepared
@@ -47,7 +48,7 @@ def bake_on(
     seed: int = 0,
     chunk: int = 256,
     progress: bool = True,
-) -> BakeStore:
+) -> StoredTransfer:
     """Bake into a store on the workers of a Dask cluster, many machines if need be.
 
     A task is a block of vertices, whose coefficients a worker writes to the store by itself; the
@@ -88,8 +89,8 @@ def bake_on(
     >>> mesh = geometry.knot(300)
     >>> with folder as path, client:
     ...     stored = transfer.bake_on(client, mesh, 2, directions=64, store=f"{path}/knot")
-    >>> stored.num_points
-    300
+    >>> stored.num_points, stored.degree
+    (300, 2)
     """
     path = as_path(store, "store").absolute()
     degree, seed = check_degree(degree), check_size("seed", seed, least=0)
@@ -124,7 +125,7 @@ def bake_on(
             kept.finish(faults(mesh, normals, blind, why))
     if said := kept.attributes["warning"]:
         warnings.warn(said, UserWarning, stacklevel=2)
-    return BakeStore(path)
+    return open(path)
 
 
 @contextlib.contextmanager
