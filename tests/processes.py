@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.experimental import multihost_utils
 
-from jaxsh import inverse, sphere, transfer
+from jaxsh import inverse, sky, sphere, transfer
 
 V, DEGREE = 33, 2
 EYE = np.array([0.3, -2.0, 1.5])
@@ -30,16 +30,22 @@ def compute(devices) -> dict[str, np.ndarray]:
     quadrature = sphere.fibonacci(V).sharded(devices)
     project = jax.jit(lambda values, quadrature: sphere.project(values.T, quadrature, DEGREE))
     found = inverse.fit_light(colors, made, rows, 1, prior=None)
+    skies = sky.fit(glow, {}, degree=1, terms=[4], samples=[9], solver="qr", devices=devices)
     results = {
         "diffuse": transfer.shade_diffuse(light, made, rows),
         "glossy": transfer.shade_glossy(light, made, EYE, material),
         "projection": project(colors, quadrature),
         "fit": found.value,
         "deviation": found.confidence.deviation,
+        "fit of a sky": skies.coefficients,
         "slope in the light": slopes[0],
         "slope in the coefficients": slopes[1],
     }
     return {name: _whole(array) for name, array in results.items()}
+
+
+def glow(view, sun):
+    return jnp.exp(view @ sun)[:, None]
 
 
 def _whole(array: jax.Array) -> np.ndarray:

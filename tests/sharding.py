@@ -1,5 +1,6 @@
 """What every public function of arrays promises on a mesh of devices."""
 
+import itertools
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
@@ -21,11 +22,23 @@ _COLLECTIVE = re.compile(
 )
 
 
-def collectives(compiled: jax.stages.Compiled) -> dict[str, str]:
-    """What devices exchange in a compiled program: a line of it for each kind."""
-    text = compiled.as_text() or ""
-    lines = ((_COLLECTIVE.search(line), line.strip()) for line in text.splitlines())
-    return {found[1]: line for found, line in lines if found}
+def collectives(compiled: jax.stages.Compiled) -> dict[str, list[str]]:
+    """The kinds of what devices exchange in a compiled program, each with its lines there."""
+    found: dict[str, list[str]] = {}
+    for line in (compiled.as_text() or "").splitlines():
+        if kind := _COLLECTIVE.search(line):
+            found.setdefault(kind[1], []).append(line.strip())
+    return found
+
+
+def longest_exchange(compiled: jax.stages.Compiled) -> int:
+    """The longest axis of the arrays that devices exchange."""
+    longest = 0
+    for line in itertools.chain.from_iterable(collectives(compiled).values()):
+        results = line[: _COLLECTIVE.search(line).start()]  # pyright: ignore[reportOptionalMemberAccess]
+        shapes = ",".join(re.findall(r"\[([\d,]*)\]", results))
+        longest = max([longest, *map(int, re.findall(r"\d+", shapes))])
+    return longest
 
 
 def check_sharded(

@@ -72,11 +72,9 @@ REASONS = {
     ),
     "sky": {
         "c_header": NO_ARRAYS,
-        "fit": HOST,
         "habel2008_evaluate": HOST,
         "habel2008_fit": NO_ARRAYS,
         "habel2008_monomials": HOST,
-        "least_squares": HOST,
         "preetham_constants": NO_ARRAYS,
         "preetham_fit": NO_ARRAYS,
         "sun_direction": HOST,

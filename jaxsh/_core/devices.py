@@ -33,6 +33,11 @@ def mesh_of(devices: Devices) -> Mesh:
     return Mesh(np.array(devices), ("rows",), axis_types=(AxisType.Auto,))
 
 
+def automatic(mesh: Mesh) -> Mesh:
+    """The same mesh with automatic axes, on which every operation runs."""
+    return Mesh(mesh.devices, mesh.axis_names, axis_types=(AxisType.Auto,) * mesh.devices.ndim)
+
+
 def share(
     array: Shaped[Array | np.ndarray, "..."],
     mesh: Mesh,

@@ -7,6 +7,7 @@ is part of the key by which `jax.jit` finds compiled code. `docs/devices.md` say
 """
 
 import functools
+import math
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
@@ -49,6 +50,20 @@ def einsum(subscripts: str, *operands: ArrayLike) -> Array:
 def tensordot(a: ArrayLike, b: ArrayLike) -> Array:
     """Sums over the last axis of `a` and the first one of `b`."""
     return jnp.tensordot(a, b, 1, precision=_FULL)
+
+
+def triangle(tall: Float[Array, "v p"]) -> Float[Array, "r p"]:
+    """R of tall = QR, which has the singular values and right singular vectors of `tall`.
+
+    On a mesh each device makes its own of its rows, and one is made of these: no device then needs
+    the rows of another.
+    """
+    devices = math.prod(jax.typeof(tall).sharding.mesh.axis_sizes)
+    if devices > 1:
+        rows = jnp.pad(tall, ((0, -len(tall) % devices), (0, 0)))
+        parts = rows.reshape(devices, -1, tall.shape[1])
+        tall = jnp.linalg.qr(parts, mode="r").reshape(-1, tall.shape[1])
+    return jnp.linalg.qr(tall, mode="r")
 
 
 def shading_matmul(a: ArrayLike, b: ArrayLike) -> Array:

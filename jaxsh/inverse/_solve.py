@@ -12,7 +12,7 @@ import optimistix as optx
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, Int
 
-from .._core.linalg import einsum, matmul
+from .._core.linalg import einsum, matmul, triangle
 from .._core.xla import keep_rows
 from ._result import Confidence
 
@@ -110,20 +110,6 @@ def everywhere(function: Callable[..., Any], *arguments: Any) -> Any:
     arrays = [leaf for leaf in jax.tree.leaves(arguments) if isinstance(leaf, jax.Array)]
     shared = [a for a in arrays if tuple(jax.typeof(a).sharding.spec)[:1] not in ((), (None,))]
     return keep_rows(function, *arguments, like=(shared or arrays)[0], axis=0, out=None)
-
-
-def triangle(tall: Float[Array, "v p"]) -> Float[Array, "r p"]:
-    """R of tall = QR, which has the singular values and right singular vectors of `tall`.
-
-    On a mesh each device makes its own of its rows, and one is made of these: no device then needs
-    the rows of another.
-    """
-    devices = math.prod(jax.typeof(tall).sharding.mesh.axis_sizes)
-    if devices > 1:
-        rows = jnp.pad(tall, ((0, -len(tall) % devices), (0, 0)))
-        parts = rows.reshape(devices, -1, tall.shape[1])
-        tall = jnp.linalg.qr(parts, mode="r").reshape(-1, tall.shape[1])
-    return jnp.linalg.qr(tall, mode="r")
 
 
 def fixed_point(

@@ -4,6 +4,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
@@ -17,7 +18,9 @@ from .._core.checks import (
     check_size,
     check_type,
     described,
+    is_concrete,
 )
+from .._core.devices import Devices, automatic, last_of, mesh_of, share
 from .._core.linalg import einsum, in_full, matmul
 from ..harmonics import orders
 from ._angles import half_rows
@@ -26,7 +29,10 @@ from ._sky_fit import Axis, Prefactor, SkyFit, design, monomials
 from ._solve import Solution, Solver, least_squares
 
 # Those that the named fits pass on.
-OPTIONS = ("zenith", "weight", "lawson", "samples", "project", "solver", "max_steps", "throw")
+OPTIONS = (
+    *("zenith", "weight", "lawson", "samples", "project", "solver", "max_steps", "throw"),
+    "devices",
+)
 
 
 # The model's own products too.
@@ -49,6 +55,7 @@ def fit(
     solver: Solver = "gauss-newton",
     max_steps: int = 256,
     throw: bool = True,
+    devices: Devices = None,
 ) -> SkyFit:
     """Fits a sky's coefficients as functions of the sun and the sky's parameters.
 
@@ -75,6 +82,9 @@ def fit(
       `parity` is on, since there the condition number is 1e4 rather than 10.
     - `throw`: raise `RuntimeError` where a solver did not converge; otherwise its result code is
       in the fit's `solution`.
+    - `devices`: share the samples out over them: a list of `jax.Device`, also those of other
+      processes, which then all call this, or a `jax.sharding.Mesh`. By default JAX's default
+      device takes all. The model and the solver run where the samples are.
 
     In JAX's default float type: fit with x64 on, and evaluate in any. Runs on the host's values
     and not inside `jit`. Raises `ValueError` for wrong ranges, counts and names, for coefficients
@@ -109,6 +119,14 @@ def fit(
     suns = jnp.stack([jnp.sin(theta), jnp.zeros_like(theta), jnp.cos(theta)], axis=-1)
 
     _check_symmetry(model, suns, numbers)
+    counted = jnp.ones_like(theta)
+    if devices is not None:
+        # The last sample again, which counts nothing, where their number is not a multiple.
+        mesh = automatic(mesh_of(devices))
+        counted = share(counted, mesh)
+        theta, height, suns, *numbers = (
+            share(a, mesh, filling=last_of(a)) for a in (theta, height, suns, *numbers)
+        )
     exact = project(model, suns, *numbers, degree=degree, symmetric=True)
     _check_finite(exact, theta, numbers)
     channels = exact.shape[-2]
@@ -122,10 +140,12 @@ def fit(
     scales = monomials(jnp.sin(theta), degree + 1)[powers]
     factors = jnp.ones_like(targets[:, 0]) if prefactor is None else prefactor(suns, *numbers).T
     scales = factors[:, None] * scales[None]
-    weights = jnp.ones_like(theta) if weight is None else weight(suns, *numbers)
+    weights = counted if weight is None else counted * weight(suns, *numbers)
     columns = design(axes, [height, *numbers], terms).T
     solve = functools.partial(_solve, columns, targets, scales, solver=solver, max_steps=max_steps)
     values, solution = _reweighted(solve, mix, weights, lawson)
+    if devices is not None:  # each process has all of what was found
+        values, solution = jax.tree.map(lambda a: jnp.asarray(np.asarray(a)), (values, solution))
     if throw and not solution.converged:
         raise RuntimeError(
             f"the solver did not converge in {int(solution.steps)} steps, residual "
@@ -220,8 +240,11 @@ def _times(vectors, matrix):
 
 
 def _check_finite(exact, theta, numbers) -> None:
-    bad = np.flatnonzero(~np.isfinite(np.asarray(exact)).all(axis=(-2, -1)))
-    if len(bad):
+    finite = jnp.isfinite(exact).all(axis=(-2, -1))
+    if not finite.all():
+        if not is_concrete(finite):
+            raise ValueError("the sky is not finite everywhere in its range")
+        bad = np.flatnonzero(~np.asarray(finite))
         where = [f"{float(v[bad[0]]):g}" for v in (jnp.degrees(theta), *numbers)]
         raise ValueError(
             f"the sky is not finite at {where[0]} degrees from the zenith and parameters "

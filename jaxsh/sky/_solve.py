@@ -11,7 +11,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from .._core.checks import as_finite, check_size, described, nearest
-from .._core.linalg import matmul
+from .._core.linalg import matmul, triangle
+from .._core.xla import keep_rows, on_mesh
 
 _Named = Literal["gauss-newton", "levenberg-marquardt", "qr"]
 Solver = _Named | Any  # or an `optimistix.AbstractLeastSquaresSolver`
@@ -68,6 +69,9 @@ def least_squares(
     in one step, to check the others by. Does not raise where a solver fails: see `Solution`.
     Raises `ValueError` for a solver that there is not. Runs on the host's values, not inside `jit`.
 
+    Samples may be shared out over a mesh of devices. Each then makes a triangle of its own of its
+    samples, by QR, and these small ones are solved together on each device.
+
     **Example**
 
     >>> import jax.numpy as jnp
@@ -122,15 +126,31 @@ def _named(solver: Solver, dtype):
 
 @eqx.filter_jit
 def _solve(design, targets, scales, solver, max_steps):
+    if not on_mesh(design, targets, scales):
+        return _of_each(design, targets, scales, solver, max_steps)
+
+    def shared(design, targets, scales):
+        # With the targets as one more column, the norm of what is left is that of all samples.
+        tall = jnp.concatenate([scales[..., None] * design[None], targets[..., None]], axis=-1)
+        small = jax.vmap(triangle)(tall)
+        reduced = small[..., :-1], small[..., -1], jnp.ones_like(small[..., -1])
+        return _of_each(*reduced, solver, max_steps)
+
+    # Along the samples, the last axis but for the design.
+    return keep_rows(shared, design, targets, scales, like=targets, axis=1, out=None)
+
+
+def _of_each(design, targets, scales, solver, max_steps):
+    """Solves each problem, of one design for all or of one for each."""
     import lineax as lx
     import optimistix as optx
 
-    def linear(target, scale):
+    def linear(design, target, scale):
         operator = lx.MatrixLinearOperator(scale[:, None] * design)
         solution = lx.linear_solve(operator, target, lx.QR(), throw=False)
         return solution.value, jnp.ones((), jnp.int32), optx.RESULTS.promote(solution.result)
 
-    def iterative(target, scale):
+    def iterative(design, target, scale):
         def residual(c, _):
             return scale * matmul(design, c) - target
 
@@ -138,4 +158,5 @@ def _solve(design, targets, scales, solver, max_steps):
         solution = optx.least_squares(residual, solver, start, max_steps=max_steps, throw=False)
         return solution.value, solution.stats["num_steps"], solution.result
 
-    return jax.vmap(linear if solver == "qr" else iterative)(targets, scales)
+    one = linear if solver == "qr" else iterative
+    return jax.vmap(one, (None if design.ndim == 2 else 0, 0, 0))(design, targets, scales)

@@ -6,13 +6,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from sharding import ROWS, WHOLE, check_sharded
+from jax.sharding import AxisType
+from sharding import ROWS, WHOLE, P, check_sharded, longest_exchange
 from suns import upper_directions
 
 from jaxsh import sky
-from jaxsh.sky import _hosek
+from jaxsh.sky import _hosek, _solve
 
 COUNT = 6
+SECOND = P(None, "rows")
 
 
 @pytest.fixture
@@ -65,9 +67,6 @@ def test_projection(sky_of):
     exact = functools.partial(sky.project_preetham, degree=1)
     check_sharded(exact, suns, (ROWS,) * 2, ROWS)
 
-    def glow(view, sun, haze):
-        return jnp.exp(haze * (view @ sun))[:, None]
-
     def slopes(sun, haze):  # of a sky that compiles faster
         def value(s, h):
             return sky.project(glow, s, h, degree=1, symmetric=True)[..., 2].sum()
@@ -117,6 +116,47 @@ def test_ground_and_errors(rng):
     check_sharded(
         lambda *a: tuple(sky.fit_error(*a)), (light, exact, low), (ROWS,) * 3, (ROWS, ROWS)
     )
+
+
+def glow(view, sun, haze):
+    return jnp.exp(haze * (view @ sun))[:, None]
+
+
+@pytest.mark.parametrize("solver", ["qr", pytest.param("gauss-newton", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "kind", [AxisType.Auto, pytest.param(AxisType.Explicit, marks=pytest.mark.slow)]
+)
+def test_fits_share_their_samples_out(solver, kind):
+    """35 samples, so that one fills up, and two rounds of Lawson's."""
+    options = {"degree": 1, "terms": (4, 2), "samples": (7, 5), "solver": solver, "lawson": 1}
+    mesh = jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+    found, expected = (
+        sky.fit(glow, {"haze": (1.0, 2.0)}, **options, devices=devices) for devices in (mesh, None)
+    )
+    # Of coefficients up to 3.4.
+    np.testing.assert_allclose(found.coefficients, expected.coefficients, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(found.solution.residual, expected.solution.residual, rtol=1e-12)
+    assert found.solution.steps == expected.solution.steps
+    assert len(found.coefficients.sharding.device_set) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [AxisType.Auto, AxisType.Explicit])
+@pytest.mark.parametrize("solver", ["qr", "gauss-newton"])
+def test_no_device_gets_the_samples_of_another(solver, kind, rng):
+    samples = rng.normal(size=(64, 3)), rng.normal(size=(5, 64)), rng.uniform(1, 2, size=(5, 64))
+    mesh = jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+    placed = [
+        jax.device_put(array, jax.NamedSharding(mesh, spec))
+        for array, spec in zip(samples, (ROWS, SECOND, SECOND), strict=True)
+    ]
+    values, solution = sky.least_squares(*placed, solver=solver)
+    expected, alone = sky.least_squares(*map(jnp.asarray, samples), solver=solver)
+    np.testing.assert_allclose(values, expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(solution.residual, alone.residual, rtol=1e-14)
+    arguments = *placed, _solve._named(solver, placed[0].dtype), 9
+    compiled = _solve._solve.lower(*arguments).compile().compiled
+    assert 0 < longest_exchange(compiled) < 64
 
 
 def test_another_device_than_the_first(sky_of):

@@ -66,6 +66,7 @@ def calls():
             log=["haze"],
             mix=np.eye(1),
             **options,
+            devices=None,
             slow=True,
             finite="mix",
         ),
