@@ -15,9 +15,11 @@ from ._rays import Hit, Vectors, limits_of, paired, prepared
 from ._trace import Trace, cast
 from ._tree import RayTree, ray_tree
 
-# Lanes on a CPU fit its cache; an accelerator wants many more.
+# Lanes on a CPU fit its cache.
 _LANES = {"cpu": 2048}
-_MANY_LANES = 32_768
+# An accelerator hides memory's latency behind as many threads as it can hold, 2,048 for each
+# multiprocessor of a GPU, and its host needs about as long to start a step as that many lanes take.
+_LANES_FOR_EACH_CORE, _FEWEST_LANES, _MOST_LANES = 4096, 2**15, 2**20
 # Rays in a chunk, for each lane: the last rays of a chunk leave lanes idle.
 _CHUNK = 32
 
@@ -33,9 +35,11 @@ class JaxRayScene:
     it.
 
     On a CPU slower than Embree, which is made for it. The first query compiles, once for each
-    power of two of the number of faces; no number of rays compiles anew. Memory is bounded, for
-    rays pass in chunks. `tree` is what `trace` takes, for rays cast inside `jit`; the methods run
-    outside it, on one device, and give NumPy arrays. Not differentiable.
+    power of two of the number of faces; no number of rays compiles anew on a CPU, and five sizes of
+    chunks do on an accelerator. Memory is bounded, for rays pass in chunks. `tree` is what `trace`
+    takes, for rays cast inside `jit`, and `lanes` how many suit the device that it is on: the
+    default one when the scene was made, where the methods cast too. These run outside `jit` and
+    give NumPy arrays. Not differentiable.
 
     Raises `ValueError` for no mesh, and for meshes without a face of finite corners.
 
@@ -62,6 +66,16 @@ class JaxRayScene:
         self.tree = ray_tree(corners, self.frame)
         self._starts = np.cumsum([0] + [len(mesh.faces) for mesh in meshes])
 
+    @property
+    def lanes(self) -> int:
+        """How many rays are best under way at once on the device of `tree`, for `trace`."""
+        return _lanes_of(self.device)
+
+    @property
+    def device(self) -> jax.Device:
+        """Where `tree` is, and rays are cast."""
+        return next(iter(self.tree.boxes.devices()))
+
     def occluded(
         self,
         origins: Vectors,
@@ -75,8 +89,8 @@ class JaxRayScene:
         origins, directions = paired(origins, directions)
         limits = limits_of(max_distance, len(origins))
         result = np.empty(len(origins), bool)
-        for part, (_, triangle, _) in self._each_chunk(origins, directions, limits, first=False):
-            result[part] = triangle >= 0
+        for part, found, _ in self._each_chunk(origins, directions, limits, first=False):
+            result[part] = np.asarray(found.triangle)[: part.stop - part.start] >= 0
         return result
 
     def closest_hit(self, origins: Vectors, directions: Vectors) -> Hit:
@@ -86,18 +100,26 @@ class JaxRayScene:
         limits = np.broadcast_to(np.float32(np.inf), count)
         triangle = np.empty(count, np.int32)
         distance, weights = np.empty(count, np.float32), np.empty((count, 3), np.float32)
-        for part, found in self._each_chunk(origins, directions, limits, first=True):
-            distance[part], triangle[part], weights[part] = found
+        for part, found, ahead in self._each_chunk(origins, directions, limits, first=True):
+            far, *rest = (np.asarray(array)[: part.stop - part.start] for array in found)
+            distance[part] = self.frame.distances(far, ahead)
+            triangle[part], weights[part] = rest
         mesh = np.searchsorted(self._starts, triangle, side="right").astype(np.int32) - 1
         face = np.where(mesh >= 0, triangle - self._starts[mesh], -1).astype(np.int32)
         return Hit(distance, mesh, face, weights)
 
     def _each_chunk(
         self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, *, first: bool
-    ) -> Iterator[tuple[slice, tuple[np.ndarray, ...]]]:
-        """Cast rays in chunks of one size, and yield what the rays of each met."""
-        lanes = _LANES.get(jax.default_backend(), _MANY_LANES)
-        size = lanes * _CHUNK
+    ) -> Iterator[tuple[slice, Trace, np.ndarray | None]]:
+        """Cast rays in chunks of one size; yields which, what they met, and how far ahead they are.
+
+        Few rays get a smaller chunk on an accelerator, so that it is not filled up with many. What
+        is yielded is to be waited for before the next, for whose rays its arrays serve again.
+        """
+        device, lanes = self.device, self.lanes
+        size = min(lanes, _LANES["cpu"]) * _CHUNK
+        while size < min(len(origins), lanes * _CHUNK):
+            size *= 4
         padded = [np.zeros(shape, np.float32) for shape in ((size, 3), (size, 3), size)]
         for start in range(0, len(origins), size):
             part = slice(start, min(start + size, len(origins)))
@@ -106,11 +128,17 @@ class JaxRayScene:
             rays.append(self.frame.limits(limits[part], ahead))
             for array, values in zip(padded, rays, strict=True):
                 array[:count] = values
-            found = _trace(
-                self.tree, *map(jnp.asarray, padded), first=first, count=count, lanes=lanes
-            )
-            distance, *rest = (np.asarray(array)[:count] for array in found)
-            yield part, (self.frame.distances(distance, ahead), *rest)
+            given = (jax.device_put(array, device) for array in padded)
+            found = _trace(self.tree, *given, first=first, count=count, lanes=min(lanes, size))
+            yield part, found, ahead
+
+
+def _lanes_of(device: jax.Device) -> int:
+    if device.platform in _LANES:
+        return _LANES[device.platform]
+    cores = getattr(device, "core_count", None) or 1
+    wanted = 1 << (cores * _LANES_FOR_EACH_CORE).bit_length() - 1
+    return min(max(wanted, _FEWEST_LANES), _MOST_LANES)
 
 
 _trace: Callable[..., Trace] = jax.jit(cast, static_argnames="lanes")

@@ -1,6 +1,7 @@
 """Rays through a tree of boxes, in JAX: many lanes walk in step, each with a ray of its own."""
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -148,8 +149,14 @@ def cast(
     end = jnp.asarray(count, jnp.int32)
     if apart:
         return _cast_apart(tree, origins, directions, limits, end, first)
-    lanes = min(lanes, len(origins))
-    return _cast_in_lanes(tree, origins, directions, limits, end, first, lanes)
+    rays = jnp.concatenate([origins, directions], axis=1)
+
+    def ray_of(at: Int[Array, " L"]) -> tuple[Array, Array, Array]:
+        vectors = rays[at].T
+        return vectors[:3], vectors[3:], limits[at]
+
+    leaf = walk_in_lanes(tree, ray_of, len(rays), None, first=first, count=end, lanes=lanes)
+    return met(tree, rays, leaf)
 
 
 def _power_of_two(x: Float[Array, " n"]) -> Float[Array, " n"]:
@@ -159,35 +166,46 @@ def _power_of_two(x: Float[Array, " n"]) -> Float[Array, " n"]:
     return jnp.where((power > 0) & (power < jnp.inf), power, 1)
 
 
-def _cast_in_lanes(
-    tree: RayTree, origins, directions, limits, end, first: bool | Array, lanes: int
-) -> Trace:
-    """Cast rays in lanes that take the next ray when they are through."""
-    size = len(origins)
-    rays = jnp.concatenate([origins, directions], axis=1)
+def walk_in_lanes(
+    tree: RayTree,
+    ray_of: Callable[[Int[Array, " L"]], tuple[Array, Array, Array]],
+    size: int,
+    queue: Int[Array, " n"] | None,
+    *,
+    first: bool | Bool[Array, ""],
+    count: Int[Array, ""],
+    lanes: int,
+) -> Int[Array, " n"]:
+    """Find the leaf that each of `size` rays meets, -1 for none, in lanes that take ray after ray.
+
+    `ray_of` gives the origins (3, L), directions (3, L) and limits (L,) of rays by their numbers.
+    `queue` begins with the numbers of the `count` rays that are cast; without one they are the
+    first ones.
+    """
+    lanes = min(lanes, size)
 
     def refill(state: _Lanes) -> _Lanes:
         idle = state.node == 0
         found = state.found.at[jnp.where(idle, state.ray, size)].set(state.leaf, mode="drop")
-        ray = state.started + jnp.cumsum(idle, dtype=jnp.int32) - 1
-        take = idle & (ray < end)
-        ray = jnp.where(take, ray, jnp.where(idle, size, state.ray))
-        at = jnp.minimum(ray, size - 1)
-        vectors = rays[at].T
+        turn = state.started + jnp.cumsum(idle, dtype=jnp.int32) - 1
+        take = idle & (turn < count)
+        new = turn if queue is None else _rows(queue, jnp.minimum(turn, size - 1))
+        ray = jnp.where(take, new, jnp.where(idle, size, state.ray))
+        origin, direction, limit = ray_of(jnp.minimum(ray, size - 1))
         return _Lanes(
             ray=ray,
-            origin=vectors[:3],
-            direction=vectors[3:],
+            origin=origin,
+            direction=direction,
             node=jnp.where(take, 1, state.node),
             pending=jnp.where(take, 0, state.pending),
-            distance=jnp.where(take, limits[at], state.distance),
+            distance=jnp.where(take, limit, state.distance),
             leaf=jnp.where(take, -1, state.leaf),
-            started=jnp.minimum(state.started + jnp.sum(idle, dtype=jnp.int32), end),
+            started=jnp.minimum(state.started + jnp.sum(idle, dtype=jnp.int32), count),
             found=found,
         )
 
     def busy(state: _Lanes) -> Bool[Array, ""]:
-        enough = jnp.where(state.started < end, lanes * 3 // 4, 0)
+        enough = jnp.where(state.started < count, lanes * 3 // 4, 0)
         return jnp.sum(state.node > 0, dtype=jnp.int32) > enough
 
     def advance(state: _Lanes) -> _Lanes:
@@ -204,8 +222,8 @@ def _cast_in_lanes(
         started=jnp.int32(0),
         found=jnp.full(size, -1, jnp.int32),
     )
-    last = lax.while_loop(lambda state: state.started < end, advance, start)
-    return _met(tree, rays, refill(last).found)
+    last = lax.while_loop(lambda state: state.started < count, advance, start)
+    return refill(last).found
 
 
 def _cast_apart(tree: RayTree, origins, directions, limits, end, first: bool | Array) -> Trace:
@@ -228,10 +246,10 @@ def _cast_apart(tree: RayTree, origins, directions, limits, end, first: bool | A
     last = lax.while_loop(
         lambda state: jnp.any(state.node > 0), lambda state: _burst(tree, state, first), start
     )
-    return _met(tree, rays, last.leaf)
+    return met(tree, rays, last.leaf)
 
 
-def _met(tree: RayTree, rays: Float[Array, "n 6"], leaf: Int[Array, " n"]) -> Trace:
+def met(tree: RayTree, rays: Float[Array, "n 6"], leaf: Int[Array, " n"]) -> Trace:
     """Give the distance and weights of each ray at the leaf that it met."""
     hit = leaf >= 0
     _, distance, weights = meet(tree.corners[jnp.where(hit, leaf, 0)], rays[:, :3].T, rays[:, 3:].T)

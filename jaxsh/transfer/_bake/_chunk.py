@@ -1,0 +1,154 @@
+"""A chunk of a bake's vertices as one program for any device, rays included."""
+
+import functools
+import math
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array, Float, Int
+
+from ..._core.linalg import matmul
+from ...geometry import RayTree
+from ...geometry._pairs import cast_pairs, met_by_pairs
+from ...harmonics import clamped_cosine, convolve, evaluate
+from ._directions import Directions
+from ._receivers import Surface
+
+
+# Numbers that a bounce looks up at once at the ends of its rays, for each lane.
+_LOOKED_UP = 128
+
+
+class Lights(NamedTuple):
+    """Holds D directions on a device, the G guides first; see `Directions`."""
+
+    vectors: Float[Array, "d 3"]
+    rays: Float[Array, "d 3"]  # the same in float32
+    basis: Float[Array, "d k"]  # y_i times the directions' weight
+    nearest: Int[Array, " r"]  # the guide of each direction that is none
+    around: Int[Array, "n g"]
+
+
+class Reflectors(NamedTuple):
+    """Holds the faces that light bounces off, and what leaves their vertices, on a device."""
+
+    vectors: Float[Array, "d 3"]  # of equal weight
+    rays: Float[Array, "d 3"]  # the same in float32
+    faces: Int[Array, "f 3"]
+    outward: Float[Array, "f 3"]  # float32, the largest component of each about 1
+    outgoing: Float[Array, "v k"]
+
+
+def lights(directions: Directions) -> Lights:
+    """Put directions on the default device, in the order in which they are cast."""
+    vectors, guides = directions.vectors, directions.guides
+    others = np.setdiff1d(np.arange(len(vectors)), guides)
+    order = np.concatenate([guides, others])
+    return Lights(
+        vectors=jnp.asarray(vectors[order]),
+        rays=jnp.asarray(vectors[order].astype(np.float32)),
+        basis=jnp.asarray(directions.basis)[order],
+        nearest=jnp.asarray(directions.nearest[others].astype(np.int32)),
+        around=jnp.asarray(directions.around.astype(np.int32)),
+    )
+
+
+def reflectors(
+    vectors: Float[np.ndarray, "d 3"], surface: Surface, outgoing: Float[Array, "v k"]
+) -> Reflectors:
+    """Put what a bounce needs on the default device; only signs are asked of `outward`."""
+    _, exponent = np.frexp(np.abs(surface.outward).max(axis=1, keepdims=True, initial=0))
+    return Reflectors(
+        vectors=jnp.asarray(vectors),
+        rays=jnp.asarray(vectors.astype(np.float32)),
+        faces=jnp.asarray(surface.faces.astype(np.int32)),
+        outward=jnp.asarray(np.ldexp(surface.outward, -exponent).astype(np.float32)),
+        outgoing=outgoing,
+    )
+
+
+@functools.partial(jax.jit, static_argnames=("degree", "lanes"))
+def shadowed_rows(
+    tree: RayTree,
+    origins: Float[Array, "m 3"],
+    normals: Float[Array, "m 3"],
+    lights: Lights,
+    *,
+    degree: int,
+    lanes: int,
+) -> Float[Array, "m k"]:
+    """Compute what `shadowed` does, in one program: cosines, two casts of rays and a product.
+
+    `origins` are float32, in the tree's frame. All rays of the guides are cast first, and then
+    those of the other directions whose guide does not speak for them.
+    """
+    cosines = matmul(normals, lights.vectors.T)
+    above = cosines > 0
+    cast = functools.partial(cast_pairs, tree, origins, first=False, lanes=lanes)
+    guides = lights.around.shape[1]
+    known = above[:, :guides]
+    answer = cast(lights.rays[:guides], known) >= 0
+    blocked = answer
+    if len(lights.nearest):
+        doubtful = ~known
+        for other in lights.around:
+            doubtful |= (answer != answer[:, other]) & known[:, other]
+        rest = above[:, guides:]
+        asked = rest & doubtful[:, lights.nearest]
+        told = rest & ~asked & answer[:, lights.nearest]
+        blocked = jnp.concatenate(
+            [answer, told | (cast(lights.rays[guides:], asked) >= 0)], axis=1
+        )
+    exact = _unshadowed(normals, degree)
+    coefficients = exact - matmul(jnp.where(blocked, cosines, 0), lights.basis)
+    dark = jnp.any(above, axis=1) & jnp.all(above == blocked, axis=1)
+    return jnp.where(dark[:, None], 0, coefficients)
+
+
+@functools.partial(jax.jit, static_argnames="lanes")
+def bounced_rows(
+    tree: RayTree,
+    origins: Float[Array, "m 3"],
+    normals: Float[Array, "m 3"],
+    reflectors: Reflectors,
+    *,
+    lanes: int,
+) -> Float[Array, "m k"]:
+    """Compute what `bounced` does, in one program."""
+    cosines = matmul(normals, reflectors.vectors.T)
+    rays = reflectors.rays
+    leaf = cast_pairs(tree, origins, rays, cosines > 0, first=True, lanes=lanes)
+    met = met_by_pairs(tree, origins, rays, leaf)
+    face = met.triangle.reshape(leaf.shape)
+    ours = (face >= 0) & (face < len(reflectors.faces))
+    face = jnp.where(ours, face, 0)
+    outward = reflectors.outward.T
+    facing = sum(outward[axis][face] * rays[None, :, axis] for axis in range(3))
+    weight = jnp.where(ours & (facing < 0), cosines * (4 * math.pi / len(rays)), 0)
+    shares = met.barycentric.reshape(*leaf.shape, 3).astype(cosines.dtype)
+    outgoing = reflectors.outgoing
+
+    def gathered(row: tuple[Array, Array]) -> Array:
+        share, face = row
+        each = (
+            jnp.sum(share[:, corner, None] * outgoing[reflectors.faces[:, corner][face]], axis=0)
+            for corner in range(3)
+        )
+        return functools.reduce(jnp.add, each)
+
+    # Not all rows at once, for what is looked up takes K numbers for each corner and ray.
+    each = 3 * len(rays) * outgoing.shape[1]
+    return lax.map(
+        gathered, (weight[:, :, None] * shares, face), batch_size=max(_LOOKED_UP * lanes // each, 1)
+    )
+
+
+def _unshadowed(normals: Float[Array, "m 3"], degree: int) -> Float[Array, "m k"]:
+    """Expand the clamped cosine about each normal, zero about a zero normal."""
+    defined = jnp.any(normals != 0, axis=1, keepdims=True)
+    up = jnp.asarray([0, 0, 1], normals.dtype)[None]
+    exact = convolve(evaluate(jnp.where(defined, normals, up), degree), clamped_cosine(degree))
+    return jnp.where(defined, exact, 0)
