@@ -33,6 +33,7 @@ FLOORS = {
 }
 # Private files that another module may import.
 DOORS = {
+    "geometry._pairs",
     "harmonics._convention",
     "harmonics._conventions",
     "harmonics._tables",

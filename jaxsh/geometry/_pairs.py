@@ -35,16 +35,15 @@ def cast_pairs(
     return leaf.reshape(wanted.shape)
 
 
-def met_by_pairs(
+def met_along(
     tree: RayTree,
-    origins: Float[Array, "m 3"],
+    origin: Float[Array, " 3"],
     directions: Float[Array, "d 3"],
-    leaf: Int[Array, "m d"],
+    leaf: Int[Array, " d"],
 ) -> Trace:
-    """Give what `trace` does for the leaves that `cast_pairs` has found, row by row."""
-    shape = *leaf.shape, 3
-    ends = jnp.broadcast_to(origins[:, None], shape), jnp.broadcast_to(directions[None], shape)
-    return met(tree, jnp.concatenate(ends, axis=-1).reshape(-1, 6), leaf.reshape(-1))
+    """Give what `trace` does for the leaves that `cast_pairs` has found for one origin."""
+    start = jnp.broadcast_to(origin, directions.shape)
+    return met(tree, jnp.concatenate([start, directions], axis=1), leaf)
 
 
 def _queue(wanted: Bool[Array, "m d"]) -> tuple[Int[Array, " n"], Int[Array, ""]]:

@@ -6,15 +6,16 @@ import warnings
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import ArrayLike, Float, Int
+from jaxtyping import Array, ArrayLike, Float, Int
 
 from ... import geometry
 from ..._core.checks import as_host_float, as_path, check_degree, check_size, check_type
-from ...geometry import Mesh, RayScene, ray_scene
+from ...geometry import Mesh, RayScene
 from .._transfer import Transfer
 from ._blind import why_blind
+from ._device import DeviceJob, job_of, scene_for, takes_device
 from ._faults import check_arguments, faults
-from ._job import BakeArguments, Job, Prepared
+from ._job import BakeArguments, Prepared
 from ._kept import BakeStore, refuse
 from ._origins import origins
 from ._passes import Passes, progress_bar
@@ -32,6 +33,7 @@ def bake(
     ray_bias: float | None = None,
     offset: float | None = None,
     scene: RayScene | None = None,
+    device: bool | None = None,
     seed: int = 0,
     chunk: int = 256,
     store: str | os.PathLike[str] | None = None,
@@ -69,7 +71,13 @@ def bake(
     - `scene`: the surfaces that stop rays, where these are not the mesh alone: any
       `geometry.RayScene`. For bounces the mesh must be the first in it. By default
       `geometry.ray_scene(mesh)`, which casts by JAX where Embree is not installed.
-    - `chunk`: vertices in a block, rounded up to a multiple of 64. Each core works on one block.
+    - `device`: `True` casts the rays on JAX's default device, in one program for each of a few
+      chunks of vertices, and the coefficients stay there; a `scene` must then be a
+      `geometry.JaxRayScene`, on whose device it is done. `False` casts them on the host. By default
+      they are cast on a GPU or TPU where that is the default device and `scene` allows it. The two
+      differ where rays graze an edge, by far less than two seeds do (experiment `device_bake`).
+    - `chunk`: vertices in a block, rounded up to a multiple of 64. Each core works on one block. On
+      a device its size and `directions` decide.
     - `store`: a folder, made here, that keeps the blocks finished so far and in the end the whole
       transfer, for any reader of Zarr 3. A bake that was stopped goes on from it when called again
       with the same arguments, and blocks that are damaged are baked again. It does not record
@@ -89,8 +97,8 @@ def bake(
     what they miss, by Embree more than by `geometry.JaxRayScene`.
 
     Raises `ValueError` for arguments and values out of range, and for the store of another bake or
-    another thing, which is left as it is; `OSError` where the store cannot be written. Runs in
-    NumPy on the host, outside `jit`, and does not shard: give the result's arrays to
+    another thing, which is left as it is; `OSError` where the store cannot be written. Runs outside
+    `jit`, what is done once for the mesh in NumPy, and does not shard: give the result's arrays to
     `jax.device_put`. Not differentiable: visibility is a step.
 
     **Example**
@@ -104,6 +112,7 @@ def bake(
     seed = check_size("seed", seed, least=0)
     if scene is not None:
         check_type("scene", scene, RayScene)
+    on_device = takes_device(device, scene)
     path = None if store is None else as_path(store, "store")
     check_arguments(mesh, directions, shadows, bounces, albedo, ray_bias, offset, chunk)
     arguments = BakeArguments(
@@ -116,6 +125,7 @@ def bake(
         offset=None if offset is None else float(offset),
         seed=seed,
         scene=scene is not None,
+        device=on_device and bool(shadows),
     )
     identity = {} if path is None else arguments.identity(mesh)
     if path is not None:
@@ -123,7 +133,7 @@ def bake(
     normals = unit_normals(mesh)
     caster, start, positions = None, None, np.asarray(mesh.vertices)
     if shadows:
-        caster = ray_scene(mesh) if scene is None else scene
+        caster = scene_for(mesh, on_device) if scene is None else scene
         start = origins(mesh, normals, caster, ray_bias, offset)
         positions = start.positions
 
@@ -132,19 +142,22 @@ def bake(
             return []
         return why_blind(mesh, caster, blind, normals, start)
 
-    job = Job(mesh, arguments, caster, Prepared(normals, positions))
+    job = job_of(mesh, arguments, caster, Prepared(normals, positions))
     kept = None if path is None else BakeStore.of(path, mesh, job, identity)
     with progress_bar(job.passes * len(normals), progress) as bar:
         passes = Passes(job, chunk, kept, bar)
+        run = passes.run
+        if kept is None and isinstance(job, DeviceJob):
+            run = functools.partial(job.whole, bar)
         if kept is not None and kept.finished:
             said = kept.attributes["warning"]
-            coefficients = passes.run(job.passes - 1)
+            coefficients = run(job.passes - 1)
         else:
-            coefficients = direct = passes.run(0)
-            blind = ~direct.any(axis=1) & normals.any(axis=1)
+            coefficients = direct = run(0)
+            blind = ~np.asarray(direct.any(axis=1)) & normals.any(axis=1)
             said = faults(mesh, normals, np.flatnonzero(blind), why)
             for bounce in range(1, job.passes):
-                coefficients = passes.run(bounce, coefficients, direct)
+                coefficients = run(bounce, coefficients, direct)
             if kept is not None:
                 kept.finish(said)
     if said:
@@ -152,7 +165,7 @@ def bake(
     return _transfer(mesh, coefficients)
 
 
-def _transfer(mesh: Mesh, coefficients: Float[np.ndarray, "v k"]) -> Transfer:
+def _transfer(mesh: Mesh, coefficients: Float[np.ndarray | Array, "v k"]) -> Transfer:
     return Transfer(
         coefficients=jnp.asarray(coefficients),
         positions=jnp.asarray(mesh.vertices),

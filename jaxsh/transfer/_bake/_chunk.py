@@ -12,11 +12,10 @@ from jaxtyping import Array, Float, Int
 
 from ..._core.linalg import matmul
 from ...geometry import RayTree
-from ...geometry._pairs import cast_pairs, met_by_pairs
+from ...geometry._pairs import cast_pairs, met_along
 from ...harmonics import clamped_cosine, convolve, evaluate
 from ._directions import Directions
 from ._receivers import Surface
-
 
 # Numbers that a bounce looks up at once at the ends of its rays, for each lane.
 _LOOKED_UP = 128
@@ -99,9 +98,7 @@ def shadowed_rows(
         rest = above[:, guides:]
         asked = rest & doubtful[:, lights.nearest]
         told = rest & ~asked & answer[:, lights.nearest]
-        blocked = jnp.concatenate(
-            [answer, told | (cast(lights.rays[guides:], asked) >= 0)], axis=1
-        )
+        blocked = jnp.concatenate([answer, told | (cast(lights.rays[guides:], asked) >= 0)], axis=1)
     exact = _unshadowed(normals, degree)
     coefficients = exact - matmul(jnp.where(blocked, cosines, 0), lights.basis)
     dark = jnp.any(above, axis=1) & jnp.all(above == blocked, axis=1)
@@ -121,29 +118,24 @@ def bounced_rows(
     cosines = matmul(normals, reflectors.vectors.T)
     rays = reflectors.rays
     leaf = cast_pairs(tree, origins, rays, cosines > 0, first=True, lanes=lanes)
-    met = met_by_pairs(tree, origins, rays, leaf)
-    face = met.triangle.reshape(leaf.shape)
-    ours = (face >= 0) & (face < len(reflectors.faces))
-    face = jnp.where(ours, face, 0)
-    outward = reflectors.outward.T
-    facing = sum(outward[axis][face] * rays[None, :, axis] for axis in range(3))
-    weight = jnp.where(ours & (facing < 0), cosines * (4 * math.pi / len(rays)), 0)
-    shares = met.barycentric.reshape(*leaf.shape, 3).astype(cosines.dtype)
-    outgoing = reflectors.outgoing
+    faces, outward, outgoing = reflectors.faces, reflectors.outward, reflectors.outgoing
 
-    def gathered(row: tuple[Array, Array]) -> Array:
-        share, face = row
-        each = (
-            jnp.sum(share[:, corner, None] * outgoing[reflectors.faces[:, corner][face]], axis=0)
-            for corner in range(3)
-        )
+    def gathered(row: tuple[Array, Array, Array]) -> Float[Array, " k"]:
+        origin, cosine, leaf = row
+        found = met_along(tree, origin, rays, leaf)
+        ours = (found.triangle >= 0) & (found.triangle < len(faces))
+        face = jnp.where(ours, found.triangle, 0)
+        front = jnp.sum(outward[face] * rays, axis=1) < 0
+        weight = jnp.where(ours & front, cosine * (4 * math.pi / len(rays)), 0)
+        share = weight[:, None] * found.barycentric.astype(cosine.dtype)
+        corner = faces[face]
+        each = (jnp.sum(share[:, i, None] * outgoing[corner[:, i]], axis=0) for i in range(3))
         return functools.reduce(jnp.add, each)
 
     # Not all rows at once, for what is looked up takes K numbers for each corner and ray.
-    each = 3 * len(rays) * outgoing.shape[1]
-    return lax.map(
-        gathered, (weight[:, :, None] * shares, face), batch_size=max(_LOOKED_UP * lanes // each, 1)
-    )
+    most = max(_LOOKED_UP * lanes // (3 * len(rays) * outgoing.shape[1]), 1)
+    together = min(1 << most.bit_length() - 1, len(origins))
+    return lax.map(gathered, (origins, cosines, leaf), batch_size=together)
 
 
 def _unshadowed(normals: Float[Array, "m 3"], degree: int) -> Float[Array, "m k"]:

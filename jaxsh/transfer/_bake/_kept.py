@@ -11,6 +11,7 @@ from ... import geometry
 from ..._core.words import reason
 from ...geometry import Mesh, RayScene
 from .._store import BlockStore, DamagedError, block_rows, make
+from ._device import job_of, scene_for
 from ._job import BakeArguments, Job, Prepared
 
 _PASSES = "passes"
@@ -67,9 +68,9 @@ class BakeStore(BlockStore):
         )
         mesh = self.mesh()
         if scene is None and arguments.shadows:
-            scene = geometry.ray_scene(mesh, threads=threads)
+            scene = scene_for(mesh, arguments.device, threads)
         prepared = Prepared(self.whole("unit_normals"), self.whole("origins"))
-        return Job(mesh, arguments, scene, prepared)
+        return job_of(mesh, arguments, scene, prepared)
 
     def mesh(self) -> Mesh:
         """Read the mesh."""

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._core.host import cores
+from ._device import UNDER_WAY, DeviceJob
 from ._gather import TILE
 from ._job import Job
 from ._kept import BakeStore
@@ -45,13 +46,15 @@ class Passes:
         def gather(part: slice) -> np.ndarray:
             return self.job.rows(number, part, before, None if direct is None else direct[part])
 
-        size = -(-self.chunk // TILE) * TILE
+        size, threads = -(-self.chunk // TILE) * TILE, cores()
+        if isinstance(self.job, DeviceJob):
+            size, threads = self.job.chunk, UNDER_WAY
         parts = [
             slice(start, min(start + size, run.stop))
             for run in missing
             for start in range(run.start, run.stop, size)
         ]
-        with contextlib.closing(_in_order(gather, parts)) as blocks:
+        with contextlib.closing(_in_order(gather, parts, threads)) as blocks:
             for part, values in blocks:
                 rows[part] = values
                 if store is not None:
@@ -78,9 +81,11 @@ def progress_bar(total: int, shown: bool):
     return tqdm(total=total, desc="bake", unit=" vertices", delay=1, file=sys.stderr, disable=None)
 
 
-def _in_order(gather: Gather, parts: list[slice]) -> Generator[tuple[slice, np.ndarray]]:
+def _in_order(
+    gather: Gather, parts: list[slice], threads: int
+) -> Generator[tuple[slice, np.ndarray]]:
     """Yield each part with its rows. After an exception or interrupt later parts do not start."""
-    with ThreadPoolExecutor(cores()) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         futures = [pool.submit(gather, part) for part in parts]
         try:
             for part, future in zip(parts, futures, strict=True):

@@ -1,0 +1,162 @@
+"""A bake whose rays are cast on JAX's default device, chunk after chunk, without a wait between."""
+
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array, Float, Int
+
+from ..._core.checks import check_flag, described
+from ...geometry import JaxRayScene, Mesh, RayScene, ray_scene
+from ._chunk import Reflectors, bounced_rows, lights, reflectors, shadowed_rows
+from ._gather import TILE
+from ._job import BakeArguments, Job, Prepared
+
+# Rays in a chunk for each lane: many, since the last ones leave lanes idle.
+_RAYS = 32
+# Chunks that are under way at once, which bounds the memory and keeps the device from waiting.
+UNDER_WAY = 2
+
+
+def takes_device(device: bool | None, scene: RayScene | None) -> bool:
+    """Decide whether a bake's rays are cast on the default device; by default on accelerators.
+
+    Raises `ValueError` for a scene that cannot be cast there.
+    """
+    ours = scene is None or isinstance(scene, JaxRayScene)
+    if device is None:
+        return ours and _default_platform() != "cpu"
+    check_flag("device", device)
+    if device and not ours:
+        raise ValueError(
+            f"device=True needs a scene whose rays JAX casts, a JaxRayScene, got {described(scene)}"
+        )
+    return bool(device)
+
+
+def _default_platform() -> str:
+    return next(iter(jnp.zeros(()).devices())).platform
+
+
+def scene_for(mesh: Mesh, device: bool) -> RayScene:
+    """Build the scene of a mesh alone."""
+    return JaxRayScene(mesh) if device else ray_scene(mesh)
+
+
+def job_of(mesh: Mesh, arguments: BakeArguments, scene: RayScene | None, prepared: Prepared) -> Job:
+    """Make the job that casts rays where the arguments say."""
+    if arguments.device and isinstance(scene, JaxRayScene):
+        return DeviceJob(mesh, arguments, scene, prepared)
+    return Job(mesh, arguments, scene, prepared)
+
+
+class DeviceJob(Job):
+    """Computes what a `Job` does with one program for each chunk of vertices, on a device.
+
+    Chunks lie fixed on the mesh, and a vertex has its place in one, so that its sums are added in
+    one order whatever rows are asked for.
+    """
+
+    def __init__(
+        self, mesh: Mesh, arguments: BakeArguments, scene: JaxRayScene, prepared: Prepared
+    ):
+        super().__init__(mesh, arguments, scene, prepared)
+        self._scene = scene
+        wanted = max(scene.lanes * _RAYS // arguments.directions, 1)
+        whole = 1 << (self.num_points - 1).bit_length()
+        self.chunk = max(min(1 << wanted.bit_length() - 1, whole), TILE)
+        reach = np.abs(scene.frame.into(prepared.origins)).max(axis=1)
+        self._far = ~(reach <= scene.frame.far)
+        with jax.enable_x64(True):
+            self._direct = jax.device_put(lights(self._lights), scene.device)
+        self._lock = threading.Lock()
+        self._reflecting: tuple[Any, Reflectors] | None = None
+
+    def rows(
+        self,
+        number: int,
+        rows: slice,
+        before: Float[np.ndarray, "v k"] | None = None,
+        direct: Float[np.ndarray, "rows k"] | None = None,
+    ) -> Float[np.ndarray, "rows k"]:
+        """Compute what `Job.rows` does, and wait for it."""
+        with jax.enable_x64(True):
+            result = np.concatenate(
+                [np.asarray(each) for each in self._chunks(number, rows, before)]
+            )
+        if direct is not None:
+            result += direct
+        for at, values in self._from_afar(number, rows, before, direct):
+            result[at - rows.start] = values
+        return result
+
+    def whole(
+        self,
+        bar: Any,
+        number: int,
+        before: Float[Array, "v k"] | None = None,
+        direct: Float[Array, "v k"] | None = None,
+    ) -> Float[Array, "v k"]:
+        """Compute what `Job.rows` does of all vertices; it stays on the device."""
+        every, blocks = slice(0, self.num_points), []
+        with jax.enable_x64(True):
+            for values in self._chunks(number, every, before):
+                blocks.append(values)
+                if len(blocks) >= UNDER_WAY:
+                    bar.update(len(blocks[-UNDER_WAY].block_until_ready()))
+            bar.update(sum(map(len, blocks[-UNDER_WAY + 1 :])))
+            result = jnp.concatenate(blocks)
+            if direct is not None:
+                result += direct
+            for at, values in self._from_afar(number, every, before, direct):
+                result = result.at[at].set(values)
+        return result
+
+    def _chunks(self, number: int, rows: slice, before: Any) -> Iterator[Float[Array, "m k"]]:
+        """Start the programs of the chunks that hold some rows, and give the rows of each."""
+        scene, size, start = self._scene, self.chunk, self.prepared
+        light = self._reflected(before) if number else self._direct
+        for first in range(rows.start - rows.start % size, rows.stop, size):
+            part = slice(max(first, rows.start), min(first + size, rows.stop))
+            at, count = part.start - first, part.stop - part.start
+            origins, normals = np.zeros((size, 3), np.float32), np.zeros((size, 3), self.dtype)
+            # Rows of others, and of origins that are far off, have no normal: no ray leaves them.
+            near = ~self._far[part, None]
+            origins[at : at + count] = np.where(near, scene.frame.into(start.origins[part]), 0)
+            normals[at : at + count] = np.where(near, start.normals[part], 0)
+            given = scene.tree, *jax.device_put((origins, normals), scene.device), light
+            if number == 0:
+                values = shadowed_rows(*given, degree=self.arguments.degree, lanes=scene.lanes)
+            else:
+                values = bounced_rows(*given, lanes=scene.lanes)
+            whole = count == size
+            yield values if whole else lax.dynamic_slice_in_dim(values, at, count)
+
+    def _reflected(self, before: Any) -> Reflectors:
+        """Put what leaves the vertices after a pass on the device, once for all its rows."""
+        with self._lock:
+            if self._reflecting is None or self._reflecting[0] is not before:
+                device = self._scene.device
+                share = self._share.reshape(-1, 1)
+                outgoing = jax.device_put(share, device) * jax.device_put(before, device)
+                made = reflectors(self._vectors, self._surface, outgoing)
+                self._reflecting = before, jax.device_put(made, device)
+            return self._reflecting[1]
+
+    def _from_afar(
+        self, number: int, rows: slice, before: Any, direct: Any
+    ) -> Iterator[tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n k"]]]:
+        """Compute as a `Job` does the few rows whose rays start too far off for float32."""
+        far = rows.start + np.flatnonzero(self._far[rows])
+        for first in map(int, np.unique(far - far % TILE)):
+            at = far[(far >= first) & (far < first + TILE)]
+            tile = slice(max(first, rows.start), min(first + TILE, rows.stop))
+            known = [None, None]
+            if number:
+                within = slice(tile.start - rows.start, tile.stop - rows.start)
+                known = [np.asarray(before), np.asarray(direct[within])]
+            yield at, super().rows(number, tile, *known)[at - tile.start]
