@@ -42,21 +42,25 @@ def test_agrees_with_the_host(bounces):
     """No ray of these grazes an edge, so that only sums are rounded differently."""
     got, host = whole(bounces), baked(device=False, bounces=bounces)
     assert got.dtype == np.float32
-    assert relative(got, host) < 1.2e-7  # 9.4e-8 and 9.8e-8 measured
+    assert relative(got, host) < 5e-8  # 3.6e-8 and 4.6e-8 measured
     np.testing.assert_array_equal(baked(bounces=bounces), host)  # by default, on a CPU
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "directions"), [(np.float32, 300), (np.float64, 100)])
-def test_agrees_in_either_precision_and_where_all_directions_are_guides(kind, directions):
+@pytest.mark.parametrize(
+    ("kind", "directions", "tolerance"),
+    # 8.2e-8 and 4.9e-9 measured: where rays hit is told in float32.
+    [(np.float32, 300, 1e-7), (np.float64, 100, 6e-9)],
+)
+def test_agrees_in_either_precision_and_where_all_directions_are_guides(
+    kind, directions, tolerance
+):
     mesh = jax.tree.map(lambda x: x.astype(kind) if x.dtype == jnp.float32 else x, knot(300))
     albedo = np.linspace(0.2, 0.9, len(mesh.vertices))
     options = {"degree": 5, "directions": directions, "bounces": 2, "albedo": albedo}
     got = baked(mesh, device=True, **options)
     assert got.dtype == kind
-    error = relative(got, baked(mesh, device=False, **options))
-    print(error)
-    assert error < 2e-7
+    assert relative(got, baked(mesh, device=False, **options)) < tolerance
 
 
 @pytest.mark.slow
@@ -65,7 +69,7 @@ def test_a_scene_may_hold_more_than_the_mesh():
     meshes = [MESH, bodies.rectangle([-9, -9, -2], [18, 0, 0], [0, 18, 0])]
     got = baked(device=True, scene=JaxRayScene(meshes), bounces=2)
     assert relative(got, whole(2)) > 0.1
-    assert relative(got, baked(scene=ray_scene(meshes), bounces=2)) < 1.2e-7
+    assert relative(got, baked(scene=ray_scene(meshes), bounces=2)) < 1e-7
 
 
 @bounces_too
@@ -110,21 +114,16 @@ def test_vertices_that_see_nothing_or_have_no_normal_are_counted_alike():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bounces", [0, 1])
-def test_rays_from_afar_are_those_of_the_host(bounces):
-    """Every other receiver is 10⁶ times the mesh's size off, where float32 would miss it."""
-    points, faces = np.asarray(MESH.vertices, float), np.asarray(MESH.faces)
-    far = [[1e6 + 0.1 * i, 3e5, 1e5] for i in range(100)]
-    towards = np.tile([-1.0, -0.3, -0.1], (100, 1))
-    mesh = Mesh(
-        jnp.asarray(np.concatenate([points, far])),
-        jnp.asarray(faces),
-        jnp.asarray(np.concatenate([np.asarray(MESH.normals, float), towards])),
-    )
-    scene = JaxRayScene(mesh)
-    options = {"scene": scene, "bounces": bounces, "offset": 1e-4}
-    got = baked(mesh, device=True, **options)
-    np.testing.assert_array_equal(got[-100:], baked(mesh, device=False, **options)[-100:])
+@pytest.mark.parametrize("far", [1e6, 1e50])
+def test_from_afar_nothing_is_in_the_way(far):
+    """From where float32 loses origins, or does not reach at all, the mesh is too small to hit."""
+    points, normals = np.asarray(MESH.vertices, float), np.asarray(MESH.normals, float)
+    away = [[far * (1 + 0.01 * i), 3e5, 1e5] for i in range(100)]
+    points, normals = np.concatenate([points, away]), np.concatenate([normals, -normals[:100]])
+    mesh = Mesh(jnp.asarray(points), MESH.faces, jnp.asarray(normals))
+    options = {"scene": JaxRayScene(mesh), "offset": 1e-4}
+    got, host = (baked(mesh, device=device, **options) for device in (True, False))
+    np.testing.assert_allclose(got, host, rtol=0, atol=1e-6)
 
 
 @pytest.mark.slow
@@ -138,7 +137,9 @@ def test_nothing_is_read_back_but_what_the_whole_mesh_needs(monkeypatch):
                 patch.setattr(np, name, counting(getattr(np, name), taken))
             bake(mesh, 3, **OPTIONS | {"bounces": 1, "device": True})
         counts.append(len(taken))
-    assert counts == [23, 23]
+    # 11 for what the mesh holds, 7 for the directions; which rays start beyond a gap, and who is
+    # blind.
+    assert counts == [20, 20]
 
 
 def counting(function, taken):

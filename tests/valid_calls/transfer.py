@@ -48,6 +48,7 @@ def calls():
             ray_bias=1e-4,
             offset=None,
             scene=None,
+            device=None,
             seed=0,
             chunk=16,
             store="/dev/null/no/folder",

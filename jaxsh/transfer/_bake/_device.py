@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from ..._core.checks import check_flag, described
 from ...geometry import JaxRayScene, Mesh, RayScene, ray_scene
@@ -69,8 +69,6 @@ class DeviceJob(Job):
         wanted = max(scene.lanes * _RAYS // arguments.directions, 1)
         whole = 1 << (self.num_points - 1).bit_length()
         self.chunk = max(min(1 << wanted.bit_length() - 1, whole), TILE)
-        reach = np.abs(scene.frame.into(prepared.origins)).max(axis=1)
-        self._far = ~(reach <= scene.frame.far)
         with jax.enable_x64(True):
             self._direct = jax.device_put(lights(self._lights), scene.device)
         self._lock = threading.Lock()
@@ -90,8 +88,6 @@ class DeviceJob(Job):
             )
         if direct is not None:
             result += direct
-        for at, values in self._from_afar(number, rows, before, direct):
-            result[at - rows.start] = values
         return result
 
     def whole(
@@ -102,9 +98,9 @@ class DeviceJob(Job):
         direct: Float[Array, "v k"] | None = None,
     ) -> Float[Array, "v k"]:
         """Compute what `Job.rows` does of all vertices; it stays on the device."""
-        every, blocks = slice(0, self.num_points), []
+        blocks = []
         with jax.enable_x64(True):
-            for values in self._chunks(number, every, before):
+            for values in self._chunks(number, slice(0, self.num_points), before):
                 blocks.append(values)
                 if len(blocks) >= UNDER_WAY:
                     bar.update(len(blocks[-UNDER_WAY].block_until_ready()))
@@ -112,8 +108,6 @@ class DeviceJob(Job):
             result = jnp.concatenate(blocks)
             if direct is not None:
                 result += direct
-            for at, values in self._from_afar(number, every, before, direct):
-                result = result.at[at].set(values)
         return result
 
     def _chunks(self, number: int, rows: slice, before: Any) -> Iterator[Float[Array, "m k"]]:
@@ -124,10 +118,10 @@ class DeviceJob(Job):
             part = slice(max(first, rows.start), min(first + size, rows.stop))
             at, count = part.start - first, part.stop - part.start
             origins, normals = np.zeros((size, 3), np.float32), np.zeros((size, 3), self.dtype)
-            # Rows of others, and of origins that are far off, have no normal: no ray leaves them.
-            near = ~self._far[part, None]
-            origins[at : at + count] = np.where(near, scene.frame.into(start.origins[part]), 0)
-            normals[at : at + count] = np.where(near, start.normals[part], 0)
+            # Other rows have no normal: no ray leaves them. Origins so far off that float32 loses
+            # them stay as they are, for rays from there hit nothing but by chance.
+            origins[at : at + count] = scene.frame.into(start.origins[part])
+            normals[at : at + count] = start.normals[part]
             given = scene.tree, *jax.device_put((origins, normals), scene.device), light
             if number == 0:
                 values = shadowed_rows(*given, degree=self.arguments.degree, lanes=scene.lanes)
@@ -146,17 +140,3 @@ class DeviceJob(Job):
                 made = reflectors(self._vectors, self._surface, outgoing)
                 self._reflecting = before, jax.device_put(made, device)
             return self._reflecting[1]
-
-    def _from_afar(
-        self, number: int, rows: slice, before: Any, direct: Any
-    ) -> Iterator[tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n k"]]]:
-        """Compute as a `Job` does the few rows whose rays start too far off for float32."""
-        far = rows.start + np.flatnonzero(self._far[rows])
-        for first in map(int, np.unique(far - far % TILE)):
-            at = far[(far >= first) & (far < first + TILE)]
-            tile = slice(max(first, rows.start), min(first + TILE, rows.stop))
-            known = [None, None]
-            if number:
-                within = slice(tile.start - rows.start, tile.stop - rows.start)
-                known = [np.asarray(before), np.asarray(direct[within])]
-            yield at, super().rows(number, tile, *known)[at - tile.start]
