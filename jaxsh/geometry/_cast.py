@@ -67,12 +67,12 @@ class JaxRayScene:
 
     @property
     def lanes(self) -> int:
-        """How many rays are best under way at once on the device of `tree`, for `trace`."""
+        """Tell how many rays are best under way at once on `device`, for `trace`."""
         return _lanes_of(self.device)
 
     @property
     def device(self) -> jax.Device:
-        """Where `tree` is, and rays are cast."""
+        """Tell where `tree` is and rays are cast."""
         return next(iter(self.tree.boxes.devices()))
 
     def occluded(

@@ -8,20 +8,24 @@ import jax.numpy as jnp
 import lowered.loops
 import numpy as np
 import pytest
-import shapes
 
-from jaxsh.geometry import JaxRayScene, Mesh, knot, ray_scene, vertex_normals
+from jaxsh.geometry import JaxRayScene, Mesh, _cast, knot, ray_scene, vertex_normals
 from jaxsh.transfer import bake
 from jaxsh.transfer._bake import _chunk, _device, _passes
 from jaxsh.transfer._bake._directions import guided, turned_fibonacci
 from jaxsh.transfer._bake._receivers import surface
 
-# 256 lanes: less to compile for, and a mesh of 500 vertices takes several chunks.
-small_chunks = pytest.fixture(shapes.small_chunks, scope="module", autouse=True)
-
 MESH = knot(500)
 OPTIONS = {"directions": 64, "progress": False}  # 128 vertices in a chunk
 bounces_too = pytest.mark.parametrize("bounces", [0, pytest.param(2, marks=pytest.mark.slow)])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_lanes():
+    """Less to compile for, and a mesh of 500 vertices takes several chunks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_cast, "_LANES", {"cpu": 256})
+        yield
 
 
 def baked(mesh=MESH, degree=3, **options):

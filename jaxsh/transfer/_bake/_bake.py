@@ -1,9 +1,13 @@
 """Baking transfer: rays for every vertex, projected."""
 
+import functools
 import operator
 import os
 import warnings
+from collections.abc import Callable
+from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
@@ -112,9 +116,9 @@ def bake(
     seed = check_size("seed", seed, least=0)
     if scene is not None:
         check_type("scene", scene, RayScene)
-    on_device = takes_device(device, scene)
     path = None if store is None else as_path(store, "store")
     check_arguments(mesh, directions, shadows, bounces, albedo, ray_bias, offset, chunk)
+    on_device = takes_device(device, scene)
     arguments = BakeArguments(
         degree=degree,
         directions=operator.index(directions),
@@ -146,7 +150,7 @@ def bake(
     kept = None if path is None else BakeStore.of(path, mesh, job, identity)
     with progress_bar(job.passes * len(normals), progress) as bar:
         passes = Passes(job, chunk, kept, bar)
-        run = passes.run
+        run: Callable[..., Any] = passes.run
         if kept is None and isinstance(job, DeviceJob):
             run = functools.partial(job.whole, bar)
         if kept is not None and kept.finished:
@@ -166,8 +170,10 @@ def bake(
 
 
 def _transfer(mesh: Mesh, coefficients: Float[np.ndarray | Array, "v k"]) -> Transfer:
+    # Where JAX computes in single precision its arrays are single, as those of the mesh become.
+    dtype = jax.dtypes.canonicalize_dtype(coefficients.dtype)
     return Transfer(
-        coefficients=jnp.asarray(coefficients),
+        coefficients=jnp.asarray(coefficients, dtype),
         positions=jnp.asarray(mesh.vertices),
         normals=jnp.asarray(mesh.normals),
         neighbors=geometry.neighbors(mesh),
