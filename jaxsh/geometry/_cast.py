@@ -68,10 +68,15 @@ class JaxRayScene:
     @property
     def lanes(self) -> int:
         """Tell how many rays are best under way at once on `device`, for `trace`."""
-        return _lanes_of(self.device)
+        device = self.device
+        if device.platform in _LANES:
+            return _LANES[device.platform]
+        cores = getattr(device, "core_count", None) or 1
+        wanted = 1 << (cores * _LANES_FOR_EACH_CORE).bit_length() - 1
+        return min(max(wanted, _FEWEST_LANES), _MOST_LANES)
 
     @property
-    def device(self) -> jax.Device:
+    def device(self) -> jax.Device:  # pyright: ignore[reportInvalidTypeForm]
         """Tell where `tree` is and rays are cast."""
         return next(iter(self.tree.boxes.devices()))
 
@@ -130,14 +135,6 @@ class JaxRayScene:
             given = (jax.device_put(array, device) for array in padded)
             found = _trace(self.tree, *given, first=first, count=count, lanes=min(lanes, size))
             yield part, found, ahead
-
-
-def _lanes_of(device: jax.Device) -> int:
-    if device.platform in _LANES:
-        return _LANES[device.platform]
-    cores = getattr(device, "core_count", None) or 1
-    wanted = 1 << (cores * _LANES_FOR_EACH_CORE).bit_length() - 1
-    return min(max(wanted, _FEWEST_LANES), _MOST_LANES)
 
 
 _trace: Callable[..., Trace] = jax.jit(cast, static_argnames="lanes")
