@@ -42,9 +42,9 @@ def _default_platform() -> str:
     return next(iter(jnp.zeros(()).devices())).platform
 
 
-def scene_for(mesh: Mesh, device: bool) -> RayScene:
+def scene_for(mesh: Mesh, device: bool, threads: int | None = None) -> RayScene:
     """Build the scene of a mesh alone."""
-    return JaxRayScene(mesh) if device else ray_scene(mesh)
+    return JaxRayScene(mesh) if device else ray_scene(mesh, threads=threads)
 
 
 def job_of(mesh: Mesh, arguments: BakeArguments, scene: RayScene | None, prepared: Prepared) -> Job:
