@@ -78,7 +78,10 @@ def test_its_gradient(frame):
     light, made, _, material = frame
     rest = made.positions, made.normals, made.neighbors
     arguments = made.coefficients, light, material.diffuse, rest
-    check_sharded(jax.grad(loss), arguments, (ROWS, WHOLE, ROWS, ROWS), ROWS)
+    specs = ROWS, WHOLE, ROWS, ROWS
+    check_sharded(jax.grad(loss), arguments, specs, ROWS)
+    total = {"all-reduce": "the light is that of all vertices"}
+    check_sharded(jax.grad(loss, 1), arguments, specs, WHOLE, exchange=total)
 
 
 def test_eight_bits(frame, rng):
