@@ -6,11 +6,11 @@ No such device is needed: JAX lowers for one that is not here. The table is `tes
 import functools
 
 import jax
-import jax.numpy as jnp
 import lowered
 import lowered.loops
 import pytest
 import valid_calls
+from lowered.derivative import is_float, with_gradient
 
 PLATFORMS = ("cuda", "tpu")
 
@@ -19,26 +19,7 @@ PLATFORMS = ("cuda", "tpu")
 def traced(module: str, name: str) -> jax.stages.Traced:
     """A call of the table, with its derivative in reverse mode, traced for no platform yet."""
     call = lowered.table(module)[name]
-
-    def both(*arguments):
-        result = call.function(*arguments)
-        floats = [leaf for leaf in jax.tree.leaves(arguments) if is_float(leaf)]
-        return result, jax.grad(functools.partial(size, call, arguments))(floats)
-
-    return jax.jit(both if call.reverse else call.function).trace(*call.arguments)
-
-
-def size(call, arguments, floats):
-    """The sum of squares of all floats in a result, which makes reverse mode start everywhere."""
-    leaves, tree = jax.tree.flatten(arguments)
-    new = iter(floats)
-    leaves = [next(new) if is_float(leaf) else leaf for leaf in leaves]
-    result = call.function(*jax.tree.unflatten(tree, leaves))
-    return sum(jnp.sum(leaf**2) for leaf in jax.tree.leaves(result) if is_float(leaf))
-
-
-def is_float(leaf) -> bool:
-    return hasattr(leaf, "dtype") and jnp.issubdtype(leaf.dtype, jnp.floating)
+    return jax.jit(with_gradient(call)).trace(*call.arguments)
 
 
 def faults(module: str, name: str, platform: str) -> list[str]:

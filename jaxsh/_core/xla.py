@@ -8,6 +8,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+# Bytes that one call on an accelerator may take for what it computes on the way. Reverse mode
+# takes up to four times that.
+_ROOM = 2**30
+
 
 def on_mesh(*arguments) -> bool:
     """True where an array lives on a mesh of several devices, and inside `shard_map`."""
@@ -106,6 +110,16 @@ def device_cache(maxsize: int):
     return decorate
 
 
+def rows_at_once(size: int) -> int:
+    """Counts the rows of one call on an accelerator, where each takes `size` bytes."""
+    return max(1, _ROOM // max(size, 1))
+
+
+def equal_blocks(rows: int, most: int) -> int:
+    """Sizes blocks: the fewest of equal size and at most `most` rows."""
+    return math.ceil(rows / math.ceil(rows / most))
+
+
 def in_blocks(function, *arrays, size: int, most: int | None = None, out: int = 0):
     """`function(*arrays)`, where rows of the leading axis do not depend on each other.
 
@@ -114,7 +128,8 @@ def in_blocks(function, *arrays, size: int, most: int | None = None, out: int = 
     result is the same to rounding. Differentiable: each block is computed anew in reverse mode.
 
     `most` is the number of rows of one call on an accelerator, where each needs so much memory
-    that all together might not fit; `out` is the axis of the rows in the results.
+    that all together might not fit (`rows_at_once`): more go in the fewest blocks, of equal size.
+    `out` is the axis of the rows in the results.
     """
     rows = arrays[0].shape[0]
 
@@ -139,7 +154,8 @@ def in_blocks(function, *arrays, size: int, most: int | None = None, out: int = 
         return function(*arrays)
     # The accelerator's way too: what it kept for reverse mode would take memory on the CPU as well.
     anew = jax.checkpoint(function)
-    default = anew if most is None or rows <= most else blocks_of(most)
+    few = most is None or rows <= most
+    default = anew if few else blocks_of(equal_blocks(rows, most))
     return jax.lax.platform_dependent(*arrays, cpu=blocks_of(size), default=default)
 
 

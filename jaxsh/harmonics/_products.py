@@ -22,13 +22,12 @@ from .._core.checks import (
 )
 from .._core.host import read_only_cache
 from .._core.linalg import matmul
-from .._core.xla import in_blocks, on_mesh
+from .._core.xla import in_blocks, on_mesh, rows_at_once
 from ._indexing import degree_of, num_coefficients
 from ._tables import exact_grid
 
-# Functions per pass of `product`: on a CPU their samples stay in cache, on an accelerator they are
-# under 1 GB at degree 10.
-_BLOCK, _LARGE = 1024, 2**18
+# Functions per pass of `product` on a CPU: their samples stay in cache.
+_BLOCK = 1024
 
 
 def gaunt(degree: int) -> Float[Array, "k k k"]:
@@ -154,7 +153,8 @@ def _product(f, g, degree: int):
     pair = tuple(jnp.broadcast_to(one, (*batch, one.shape[-1])) for one in (f, g))
     if math.prod(batch) <= _BLOCK or on_mesh(pair):
         return multiply(*pair)
-    rows = in_blocks(multiply, *map(flatten_batch, pair), size=_BLOCK, most=_LARGE)
+    most = rows_at_once(3 * basis.shape[1] * basis.dtype.itemsize)  # samples of both, and of each
+    rows = in_blocks(multiply, *map(flatten_batch, pair), size=_BLOCK, most=most)
     return rows.reshape(*batch, project.shape[-1])
 
 

@@ -22,14 +22,12 @@ from .._core.checks import (
     flatten_batch,
 )
 from .._core.linalg import einsum, matmul
-from .._core.xla import in_blocks, keep_rows, on_mesh
+from .._core.xla import equal_blocks, in_blocks, keep_rows, on_mesh, rows_at_once
 from ..harmonics import clamped_cosine, convolve, degree_of, evaluate
 from ._quadrature import Quadrature
 
 # Directions per block on a CPU: 1 MB of basis at degree 10 in float32.
 _BLOCK = 2048
-# Bytes of basis per block on an accelerator.
-_LARGE = 2**28
 
 
 def project(
@@ -149,12 +147,13 @@ def irradiance(
 def _project(values, quadrature, degree: int):
     weighted = flatten_batch(values) * quadrature.weights.astype(values.dtype)[None]
     directions = quadrature.directions.astype(values.dtype)
+    count = len(directions)
 
     def whole(directions, weighted):
         return matmul(evaluate(directions, degree, axis=0), weighted.T)
 
     def streamed(size, directions, weighted):
-        if len(directions) <= size:
+        if count <= size:
             return whole(directions, weighted)
 
         @jax.checkpoint  # in reverse too, evaluate a block again rather than hold all of them
@@ -170,14 +169,15 @@ def _project(values, quadrature, degree: int):
         total, _ = jax.lax.scan(add, start, blocks)
         return total
 
-    if len(directions) <= _BLOCK or on_mesh(values, quadrature):
+    if count <= _BLOCK or on_mesh(values, quadrature):
         total = keep_rows(whole, directions, weighted, like=weighted, axis=1, out=None)
     else:
+        large = equal_blocks(count, _most(degree, values.dtype))
         total = jax.lax.platform_dependent(
             directions,
             weighted,
             cpu=functools.partial(streamed, _BLOCK),
-            default=functools.partial(streamed, _large_block(degree, values.dtype)),
+            default=functools.partial(streamed, large),
         )
     return total.T.reshape(*values.shape[:-1], len(total))
 
@@ -214,12 +214,13 @@ def _values(rows: Float[Array, "b k"], directions: Float[Array, "n 3"]) -> Float
     def block(directions):
         return matmul(rows, evaluate(directions, degree, axis=0))
 
-    most = _large_block(degree, rows.dtype)
+    most = _most(degree, rows.dtype)
     return in_blocks(block, directions.astype(rows.dtype), size=_BLOCK, most=most, out=1)
 
 
-def _large_block(degree: int, dtype) -> int:
-    return max(_BLOCK, _LARGE // ((degree + 1) ** 2 * dtype.itemsize))
+def _most(degree: int, dtype) -> int:
+    """Directions whose basis an accelerator has at once."""
+    return rows_at_once((degree + 1) ** 2 * dtype.itemsize)
 
 
 def _blocks(

@@ -15,7 +15,7 @@ from numpy.polynomial import Polynomial
 from .._core.host import read_only_cache
 from .._core.linalg import matmul, shading_matmul, tensordot
 from .._core.vectors import normalize
-from .._core.xla import materialize, on_mesh
+from .._core.xla import materialize, on_mesh, rows_at_once
 from ..harmonics import degree_of, legendre, orders, phong
 from ..harmonics._tables import exact_grid
 from ._material import (
@@ -242,23 +242,35 @@ def lobe_products(
         values = transfer.at_nodes(some, width) * lobe(cosines(directions, axis), lobes)
         return shading_matmul(weights, values)
 
-    # On one CPU the values of a pass stay in cache; elsewhere a loop would leave devices idle.
+    # On one CPU the values of a pass stay in cache. Elsewhere a loop would leave devices idle: as
+    # many passes as memory allows are one.
     def in_passes(*parts):
+        if len(parts[0]) == 1:
+            return share(*(part[0] for part in parts))
+
         @jax.checkpoint
         def add(total, part):
             return total + share(*part), None
 
         return jax.lax.scan(add, jnp.zeros((len(lights), axis.shape[1]), axis.dtype), parts)[0]
 
-    def at_once(directions, weights, passes):
-        flat = passes.reshape(-1, *passes.shape[2:])
-        weights = jnp.moveaxis(weights, 0, 1).reshape(len(lights), -1)
-        return share(directions.reshape(-1, 3), weights, flat)
+    def together(number, directions, weights, passes):
+        rows = weights.reshape(-1, number, *weights.shape[1:])
+        rows = jnp.moveaxis(rows, 1, 2).reshape(len(rows), len(lights), -1)
+        directions, passes = (
+            part.reshape(len(rows), -1, *part.shape[2:]) for part in (directions, passes)
+        )
+        return in_passes(directions, rows, passes)
 
     parts = directions, weights, transfer.node_passes(degree)
+    count, size = nodes.directions.shape[:2]
     if on_mesh(axis, parts, lobes):
-        return at_once(*parts)
-    return jax.lax.platform_dependent(*parts, cpu=in_passes, default=at_once)
+        return together(count, *parts)
+    most = rows_at_once(size * axis.shape[1] * axis.dtype.itemsize)
+    number = max(n for n in range(1, count + 1) if count % n == 0 and n <= most)
+    return jax.lax.platform_dependent(
+        *parts, cpu=in_passes, default=functools.partial(together, number)
+    )
 
 
 @jax.custom_jvp

@@ -11,7 +11,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, check_flag, check_type, is_concrete
 from .._core.linalg import einsum, matmul
-from .._core.xla import in_blocks
+from .._core.xla import in_blocks, rows_at_once
 from ..geometry import RayScene
 from ..sphere import Suns
 from ._glossy_kernels import reflected, unit
@@ -170,13 +170,17 @@ def _shade_sun(suns, positions, normals, visibility, material, eye, *, distant, 
     if visibility is not None:
         rows |= {"seen": visibility.seen, "draw": visibility.draw}
     rays, middle = aimed(suns, 1 if visibility is None else visibility.seen.shape[2])
+    # Of each vertex, all held at once on an accelerator: one with each vector of a shape, or some
+    # with each ray to a disc, and through the lobe as many again.
+    products = (1 if shaped else 4) * math.prod(rays.shape[:2]) * (1 if eye is None else 2)
     rays = rays.astype(dtype) if shaped or visibility is not None else None
     middle, solid_angle = middle.astype(dtype), suns.solid_angle.astype(dtype)
 
     def block(*some):
         return _integrals(dict(zip(rows, some, strict=True)), rays, middle, solid_angle, shaped)
 
-    parts = in_blocks(block, *rows.values(), size=_BLOCK)
+    most = rows_at_once(products * dtype.itemsize)
+    parts = in_blocks(block, *rows.values(), size=_BLOCK, most=most)
     radiance = suns.radiance.astype(dtype)
     total = jnp.multiply(*align(matmul(parts[0], radiance), material.diffuse / math.pi))
     if eye is None:
@@ -214,8 +218,11 @@ def _integrals(rows, rays, middle, solid_angle, shaped):
             # Rays tell no lobes apart that are narrower than their own distance.
             finest = math.pi * seen.shape[2] / 2 / solid_angle
             power = jnp.minimum(exponent[:, None], finest[None])[..., None] * _logarithm(some)
-            most = jax.lax.stop_gradient(jnp.max(power, axis=2, keepdims=True))
-            through = through * _share(weights * jnp.exp(power - most), seen)
+            # Of rays above the horizon: beside one below it, theirs might all be next to nothing.
+            above = jnp.where(weights > 0, power, -jnp.inf)
+            most = jax.lax.stop_gradient(jnp.max(above, axis=2, keepdims=True))
+            power = jnp.where(weights > 0, power - most, 0)
+            through = through * _share(weights * jnp.exp(power), seen)
         parts.append(through)
     return tuple(parts)
 

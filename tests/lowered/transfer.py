@@ -34,7 +34,7 @@ def calls():
     view = made_by(t.fixed_view, made, eye, material())
 
     def visibility(seen, suns):
-        draw = jnp.zeros(V, jnp.uint32)
+        draw = jnp.zeros(len(seen), jnp.uint32)
         return t.SunVisibility(seen, draw, suns.direction, suns.solid_angle)
 
     def sunny(suns, made, seen, albedo):
