@@ -21,7 +21,8 @@ from .sphere import suns
 WITHOUT = {
     "Material": "holds what it is given",
     "Transfer": "holds what it is given",
-    "bake": "casts rays in NumPy: tests/transfer tells of its way on a device",
+    "bake": "runs on the host: tests/transfer/test_bake_device.py lowers what it runs on a device",
+    "bake_on": "runs on a cluster",
     "sun_visibility": "casts rays in NumPy",
 }
 
