@@ -78,8 +78,18 @@ class BlockStore:
                 found.append(block)
         return found
 
-    def read(self, name: str, block: int) -> np.ndarray:
-        """Read one block into memory of its own; raises `DamagedError` where it is not right."""
+    def room(self, name: str) -> np.ndarray:
+        """Make room for a block of an array, from an address on that is a multiple of 64."""
+        size = _bytes(self._array(name))
+        room = np.empty(size + 64, np.uint8)
+        start = -room.ctypes.data % 64
+        return room[start : start + size]
+
+    def read(self, name: str, block: int, room: np.ndarray | None = None) -> np.ndarray:
+        """Read one block, read-only; raises `DamagedError` where it is not right.
+
+        It lies in memory of its own, or in what `room` gave.
+        """
         # In one go, to where JAX takes it without a copy: Zarr's own reading takes twice the time,
         # and in a stream of blocks copies are nearly all that it takes.
         from google_crc32c import value as crc32c
@@ -88,7 +98,7 @@ class BlockStore:
         rows = min(array.chunks[0], array.shape[0] - block * array.chunks[0])
         if not array.size:
             return np.empty((rows, *array.shape[1:]), array.dtype)
-        data = _aligned(_bytes(array))
+        data = (self.room(name) if room is None else room)[:]
         try:
             with file.open("rb", buffering=0) as opened:
                 whole = opened.readinto(data.data) == data.size and not opened.read(1)
@@ -250,13 +260,6 @@ def _checked(path: Path, group: Any, name: str) -> Any:
     ):
         raise ValueError(f"{path}: {name} are not in the chunks that jaxsh writes")
     return array
-
-
-def _aligned(size: int) -> np.ndarray:
-    """Make room for bytes from an address on that is a multiple of 64."""
-    room = np.empty(size + 64, np.uint8)
-    start = -room.ctypes.data % 64
-    return room[start : start + size]
 
 
 def _blocks(array: Any) -> int:

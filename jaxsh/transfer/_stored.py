@@ -1,11 +1,13 @@
 """Transfer that stays on disk: opened, read block by block ahead of its use, or as a whole."""
 
 import dataclasses
+import functools
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from queue import SimpleQueue
 from typing import TypeVar
 
 import jax
@@ -65,7 +67,7 @@ class StoredTransfer:
             made = Transfer(coefficients, positions, normals, neighbors)
             return rows, made
 
-        yield from self._stream(_ARRAYS, give)
+        yield from self._stream(_ARRAYS, give, keep=True)
 
     def load(self) -> Transfer:
         """Read the whole transfer into memory; raises `ValueError` for a damaged block."""
@@ -86,14 +88,17 @@ class StoredTransfer:
         """
         colors = None
 
+        @functools.cache
+        def zeros(rows: int) -> tuple[Array, Array]:
+            return jnp.zeros((rows, 3), self.dtype), jnp.zeros((rows, 0), jnp.int32)
+
         def give(rows: slice, *read: Array) -> tuple[slice, Array]:
             held = dict(zip(arrays, read, strict=True))
-            left = jnp.zeros((len(read[0]), 3), read[0].dtype)
+            left, neighbors = zeros(len(read[0]))
             positions, normals = held.get("positions", left), held.get("normals", left)
-            neighbors = jnp.zeros((len(left), 0), jnp.int32)
             return rows, shade(rows, Transfer(held["coefficients"], positions, normals, neighbors))
 
-        for rows, part in self._stream(arrays, give):
+        for rows, part in self._stream(arrays, give, keep=False):
             if colors is None:
                 colors = np.empty((*part.shape[:-2], self.num_points, 3), part.dtype)
             colors[..., rows, :] = part
@@ -101,33 +106,53 @@ class StoredTransfer:
         return colors
 
     def _stream(
-        self, arrays: Sequence[str], use: Callable[..., tuple[slice, _Result]]
+        self,
+        arrays: Sequence[str],
+        use: Callable[..., tuple[slice, _Result]],
+        *,
+        keep: bool,
     ) -> Iterator[tuple[slice, _Result]]:
         """Give what a function makes of each block's arrays, in order.
 
-        Of each device's blocks one is used while the next is read: no third is in memory.
+        Of each device's blocks one is used while the next is read: no third is in memory. Unless
+        results `keep` what they are made of, its memory is used again.
         """
-        devices = jax.local_devices()
+        devices, store = jax.local_devices(), self._store
+        count, ahead = store.num_blocks, len(devices)
+        rooms: SimpleQueue[list[np.ndarray | None]] = SimpleQueue()
+        for _ in range(2 * ahead):
+            rooms.put([None if keep else store.room(name) for name in arrays])
 
-        def read(block: int) -> list[np.ndarray]:
-            rows = self._store.rows(block)
-            return [self._local(name, rows, self._store.read(name, block)) for name in arrays]
+        def read(block: int) -> tuple[list[np.ndarray | None], list[np.ndarray]]:
+            room = rooms.get()
+            parts = [
+                self._local(name, store.rows(block), store.read(name, block, part))
+                for name, part in zip(arrays, room, strict=True)
+            ]
+            return room, parts
 
-        count, ahead = self._store.num_blocks, len(devices)
         with ThreadPoolExecutor(ahead) as pool:
             reading = deque(pool.submit(read, block) for block in range(min(ahead, count)))
-            used: deque[tuple[slice, _Result]] = deque()
+            used: deque[tuple[list[np.ndarray | None], tuple[slice, _Result]]] = deque()
+
+            def done() -> tuple[slice, _Result]:
+                room, result = used.popleft()
+                jax.block_until_ready(result)
+                rooms.put(room)
+                return result
+
             try:
                 for block in range(count):
-                    host = reading.popleft().result()
+                    room, host = reading.popleft().result()
                     if len(used) == ahead:
-                        yield jax.block_until_ready(used.popleft())
+                        yield done()
                     if block + ahead < count:
                         reading.append(pool.submit(read, block + ahead))
                     here = jax.device_put(host, devices[block % ahead])
-                    used.append(use(self._store.rows(block), *here))
+                    used.append((room, use(store.rows(block), *here)))
                     del host, here
-                yield from used
+                while used:
+                    yield done()
             finally:
                 pool.shutdown(wait=True, cancel_futures=True)
 
