@@ -4,33 +4,12 @@ import bodies
 import numpy as np
 import pytest
 import zarr
+from stopping import MESH, Scene
 
-from jaxsh.geometry import knot, ray_scene
+from jaxsh.geometry import knot
 from jaxsh.transfer import bake
 from jaxsh.transfer._bake import _passes
 from jaxsh.transfer._bake._kept import BakeStore
-
-MESH = knot(700)
-
-
-class Stopping:
-    """A ray scene that counts questions, and is interrupted at one of them."""
-
-    def __init__(self, after=10**9):
-        self._scene, self.asked, self._after = ray_scene(MESH), 0, after
-
-    def occluded(self, origins, directions, max_distance=np.inf):
-        self._count()
-        return self._scene.occluded(origins, directions, max_distance)
-
-    def closest_hit(self, origins, directions):
-        self._count()
-        return self._scene.closest_hit(origins, directions)
-
-    def _count(self):
-        self.asked += 1
-        if self.asked > self._after:
-            raise KeyboardInterrupt
 
 
 def run(scene, path=None, mesh=MESH, **options):
@@ -40,7 +19,7 @@ def run(scene, path=None, mesh=MESH, **options):
 
 @pytest.fixture(scope="module")
 def whole():
-    scene = Stopping()
+    scene = Scene()
     return run(scene), scene.asked
 
 
@@ -49,10 +28,10 @@ def test_a_stopped_bake_goes_on_and_ends_the_same(tmp_path, monkeypatch, whole, 
     monkeypatch.setattr(_passes, "cores", lambda: 1)
     expected, questions = whole
     path = tmp_path / "folder" / "knot"
-    first = Stopping(after=int(share * questions))
+    first = Scene(after=int(share * questions))
     with pytest.raises(KeyboardInterrupt):
         run(first, path)
-    second = Stopping()
+    second = Scene()
     np.testing.assert_array_equal(run(second, path, chunk=128), expected)
     # Two questions to a block of shadows; larger blocks need fewer.
     assert second.asked < questions - int(share * questions) + 4
@@ -73,10 +52,10 @@ def test_a_stopped_bake_goes_on_and_ends_the_same(tmp_path, monkeypatch, whole, 
 def test_what_is_damaged_is_computed_again(tmp_path, whole, name, damage, after):
     path = tmp_path / "knot"
     with pytest.raises(KeyboardInterrupt):
-        run(Stopping(after=after), path)
+        run(Scene(after=after), path)
     file = path / name / "c" / "1" / "0"
     hurt(file, damage)
-    np.testing.assert_array_equal(run(Stopping(), path), whole[0])
+    np.testing.assert_array_equal(run(Scene(), path), whole[0])
     assert not BakeStore(path).missing("neighbors", check=True)
     assert not BakeStore(path).missing("origins", check=True)
 
@@ -84,12 +63,12 @@ def test_what_is_damaged_is_computed_again(tmp_path, whole, name, damage, after)
 @pytest.mark.parametrize("damage", ["cut", "flip"])
 def test_a_block_damaged_in_the_end_is_baked_again(tmp_path, whole, damage):
     path = tmp_path / "knot"
-    run(Stopping(), path)
+    run(Scene(), path)
     hurt(path / "coefficients" / "c" / "3" / "0", damage)
     assert BakeStore(path).missing(check=True) == [3]
-    np.testing.assert_array_equal(run(Stopping(), path), whole[0])
+    np.testing.assert_array_equal(run(Scene(), path), whole[0])
     assert BakeStore(path).missing(check=True) == []
-    asked = Stopping()
+    asked = Scene()
     np.testing.assert_array_equal(run(asked, path), whole[0])
     assert asked.asked <= 1  # where rays start
 
@@ -125,10 +104,10 @@ def hurt(file, how):
 def test_the_store_of_another_bake_is_refused_and_kept(tmp_path, options, name):
     path = tmp_path / "knot"
     with pytest.raises(KeyboardInterrupt):
-        run(Stopping(after=8), path)
+        run(Scene(after=8), path)
     before = content_of(path)
     with pytest.raises(ValueError, match=rf"knot: the store of another bake: its {name}"):
-        run(Stopping(), path, **options)
+        run(Scene(), path, **options)
     assert content_of(path) == before
 
 
@@ -141,7 +120,7 @@ def test_another_file_is_refused_and_kept(tmp_path, content):
     path = tmp_path / "thesis.txt"
     path.write_bytes(content)
     with pytest.raises(ValueError, match=r"thesis\.txt: not a transfer store"):
-        run(Stopping(), path)
+        run(Scene(), path)
     assert path.read_bytes() == content
 
 
@@ -151,12 +130,12 @@ def test_another_file_is_refused_and_kept(tmp_path, content):
 def test_another_folder_is_refused_and_kept(tmp_path, content):
     (tmp_path / "zarr.json").write_bytes(content)
     with pytest.raises(ValueError, match="not a transfer store"):
-        run(Stopping(), tmp_path)
+        run(Scene(), tmp_path)
     assert content_of(tmp_path) == {tmp_path / "zarr.json": content}
 
 
 def test_an_empty_folder_is_filled(tmp_path, whole):
-    np.testing.assert_array_equal(run(Stopping(), tmp_path), whole[0])
+    np.testing.assert_array_equal(run(Scene(), tmp_path), whole[0])
     assert not [path for path in tmp_path.parent.iterdir() if path.name.endswith(".partial")]
 
 

@@ -1,0 +1,160 @@
+"""Bakes that the machine stops: killed, out of room, or with a store that was changed on disk."""
+
+import contextlib
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import stopping
+
+from jaxsh.transfer import bake, shade_diffuse
+from jaxsh.transfer import open as open_store
+
+OPTIONS = {"directions": 128, "bounces": 1, "progress": False}
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return np.asarray(bake(stopping.MESH, 2, **OPTIONS).coefficients)
+
+
+def ends_as(path, whole):
+    np.testing.assert_array_equal(bake(stopping.MESH, 2, store=path, **OPTIONS).coefficients, whole)
+    np.testing.assert_array_equal(open_store(path).load().coefficients, whole)
+    assert not list(path.rglob("*.partial"))
+    assert not [file for file in path.parent.iterdir() if file.name.endswith(".partial")]
+
+
+@contextlib.contextmanager
+def files_of_at_most(size):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        yield lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("after", [0, 9, 28])  # questions: before, in the first and second pass
+def test_what_cannot_be_written_is_said_and_the_rest_is_kept(tmp_path, whole, after):
+    path = tmp_path / "knot"
+    with files_of_at_most(1000) as no_room:
+        if not after:
+            no_room()
+        scene = stopping.Scene(after, no_room)
+        with pytest.raises(OSError, match=r"knot.*: cannot be written: .*File too large"):
+            bake(stopping.MESH, 2, store=path, scene=scene, **OPTIONS, chunk=64)
+    assert path.exists() == bool(after)
+    if after:
+        with pytest.raises(ValueError, match=r"knot: not finished: \d+ of 11 blocks of coeff"):
+            open_store(path)
+        scene = stopping.Scene()
+        got = bake(stopping.MESH, 2, store=path, scene=scene, **OPTIONS).coefficients
+        np.testing.assert_array_equal(got, whole)
+    else:
+        ends_as(path, whole)
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_said_and_the_rest_is_kept(tmp_path, whole):
+    """On a disk of 160 kB, where the mesh fits and the first pass does not."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=160k", "tmpfs", str(disk)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("no disk can be mounted here")
+    try:
+        path = disk / "knot"
+        with pytest.raises(OSError, match=r"knot.*: cannot be written: .*No space left"):
+            bake(stopping.MESH, 2, store=path, **OPTIONS)
+        subprocess.run(["mount", "-o", "remount,size=1m", str(disk)], check=True)
+        ends_as(path, whole)
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+KILLED = """
+import os, signal, sys
+sys.path.insert(0, {tests!r})
+import stopping
+from jaxsh.transfer import bake
+scene = stopping.Scene({after}, lambda: os.kill(os.getpid(), signal.SIGKILL))
+bake(stopping.MESH, 2, store={path!r}, scene=scene, chunk=64, **{options!r})
+"""
+
+
+@pytest.mark.slow
+def test_a_bake_that_is_killed_goes_on_and_ends_the_same(tmp_path, whole):
+    path = tmp_path / "knot"
+    for after in (9, 24):  # questions: in the first pass, and then in the second
+        script = KILLED.format(
+            tests=str(Path(__file__).parent), after=after, path=str(path), options=OPTIONS
+        )
+        run = subprocess.run([sys.executable, "-c", script], capture_output=True, check=False)
+        assert run.returncode == -signal.SIGKILL, run.stderr.decode()
+    scene = stopping.Scene()
+    got = bake(stopping.MESH, 2, store=path, scene=scene, **OPTIONS).coefficients
+    np.testing.assert_array_equal(got, whole)
+    assert 0 < scene.asked < 33
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    path = tmp_path_factory.mktemp("store") / "knot"
+    bake(stopping.MESH, 1, store=path, shadows=False, progress=False)
+    return path
+
+
+def changed(path, file, change):
+    content = (path / file).read_bytes()
+    (path / file).write_bytes(change(content))
+    return content
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "said"),
+    [
+        ("zarr.json", lambda b: b[:50], "not a transfer store"),
+        ("zarr.json", lambda b: b.replace(b"jaxsh transfer store", b"a thesis"), "not a transfer"),
+        ("zarr.json", lambda b: b.replace(b'"version": 1', b'"version": 2'), "as version 2, but"),
+        ("coefficients/zarr.json", lambda b: b[:50], "damaged: it holds no coefficients"),
+        ("normals/zarr.json", lambda b: b.replace(b"crc32c", b"gzip"), "holds no normals"),
+        ("coefficients/c/3/0", lambda b: b[:-1], "1 of 11 blocks of coefficients are missing"),
+        ("neighbors/c/0/0", lambda b: b + b" ", "1 of 11 blocks of neighbors are missing"),
+    ],
+)
+def test_what_open_refuses(finished, file, change, said):
+    before = changed(finished, file, change)
+    try:
+        with pytest.raises(ValueError, match=f"knot: .*{said}"):
+            open_store(finished)
+    finally:
+        (finished / file).write_bytes(before)
+
+
+def test_a_damaged_block_is_found_when_it_is_read(finished):
+    file = "coefficients/c/3/0"
+    before = changed(finished, file, lambda content: b"\0" + content[1:])
+    try:
+        stored = open_store(finished)
+        for use in (stored.load, lambda: shade_diffuse(jnp.ones((3, 4)), stored, 0.5)):
+            with pytest.raises(ValueError, match=rf"knot: {file} is damaged: bake into it again"):
+                use()
+    finally:
+        (finished / file).write_bytes(before)
+
+
+def test_nothing_is_opened_where_nothing_is(tmp_path):
+    with pytest.raises(FileNotFoundError, match="there is no such transfer store"):
+        open_store(tmp_path / "knot")
+    (tmp_path / "knot").write_text("a thesis")
+    with pytest.raises(ValueError, match="knot: not a transfer store"):
+        open_store(tmp_path / "knot")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ValueError, match="empty: not a transfer store"):
+        open_store(tmp_path / "empty")
+    assert list((tmp_path / "empty").iterdir()) == []
