@@ -23,7 +23,9 @@ def whole():
     return run(scene), scene.asked
 
 
-@pytest.mark.parametrize("share", [0.05, 0.3, 0.8, 0.97])
+@pytest.mark.parametrize(
+    "share", [0.3, 0.8, *(pytest.param(s, marks=pytest.mark.slow) for s in (0.05, 0.97))]
+)
 def test_a_stopped_bake_goes_on_and_ends_the_same(tmp_path, monkeypatch, whole, share):
     monkeypatch.setattr(_passes, "cores", lambda: 1)
     expected, questions = whole
@@ -44,9 +46,9 @@ def test_a_stopped_bake_goes_on_and_ends_the_same(tmp_path, monkeypatch, whole, 
     [
         ("passes/0", "cut", 18),
         ("passes/0", "flip", 30),
-        ("passes/0", "flip the sum", 30),
         ("neighbors", "remove", 18),
-        ("origins", "empty", 30),
+        pytest.param("passes/0", "flip the sum", 30, marks=pytest.mark.slow),
+        pytest.param("origins", "empty", 30, marks=pytest.mark.slow),
     ],
 )
 def test_what_is_damaged_is_computed_again(tmp_path, whole, name, damage, after):
@@ -60,11 +62,10 @@ def test_what_is_damaged_is_computed_again(tmp_path, whole, name, damage, after)
     assert not BakeStore(path).missing("origins", check=True)
 
 
-@pytest.mark.parametrize("damage", ["cut", "flip"])
-def test_a_block_damaged_in_the_end_is_baked_again(tmp_path, whole, damage):
+def test_a_block_damaged_in_the_end_is_baked_again(tmp_path, whole):
     path = tmp_path / "knot"
     run(Scene(), path)
-    hurt(path / "coefficients" / "c" / "3" / "0", damage)
+    hurt(path / "coefficients" / "c" / "3" / "0", "flip")
     assert BakeStore(path).missing(check=True) == [3]
     np.testing.assert_array_equal(run(Scene(), path), whole[0])
     assert BakeStore(path).missing(check=True) == []
@@ -89,6 +90,14 @@ def hurt(file, how):
     file.write_bytes(data)
 
 
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory):
+    path = tmp_path_factory.mktemp("store") / "knot"
+    with pytest.raises(KeyboardInterrupt):
+        run(Scene(after=8), path)
+    return path
+
+
 @pytest.mark.parametrize(
     ("options", "name"),
     [
@@ -101,10 +110,8 @@ def hurt(file, how):
         ({"mesh": knot(800)}, "mesh is"),
     ],
 )
-def test_the_store_of_another_bake_is_refused_and_kept(tmp_path, options, name):
-    path = tmp_path / "knot"
-    with pytest.raises(KeyboardInterrupt):
-        run(Scene(after=8), path)
+def test_the_store_of_another_bake_is_refused_and_kept(stopped, options, name):
+    path = stopped
     before = content_of(path)
     with pytest.raises(ValueError, match=rf"knot: the store of another bake: its {name}"):
         run(Scene(), path, **options)

@@ -39,7 +39,9 @@ def files_of_at_most(size):
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.mark.parametrize("after", [0, 9, 28])  # questions: before, in the first and second pass
+@pytest.mark.parametrize(  # questions: before, in the first and second pass
+    "after", [9, pytest.param(0, marks=pytest.mark.slow), pytest.param(28, marks=pytest.mark.slow)]
+)
 def test_what_cannot_be_written_is_said_and_the_rest_is_kept(tmp_path, whole, after):
     path = tmp_path / "knot"
     with files_of_at_most(1000) as no_room:

@@ -50,7 +50,10 @@ def lights():
     }
 
 
-@pytest.mark.parametrize("name", lights())
+@pytest.mark.parametrize(
+    "name",
+    ["one", "one each", *(pytest.param(n, marks=pytest.mark.slow) for n in ("lower", "batch"))],
+)
 def test_colors_are_those_of_the_transfer_in_memory(both, name):
     stored, baked = both
     light = lights()[name].astype(np.float32)

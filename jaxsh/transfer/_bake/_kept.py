@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -75,7 +76,8 @@ class BakeStore(BlockStore):
     def mesh(self) -> Mesh:
         """Read the mesh."""
         vertices, faces, normals = map(self.whole, ("positions", "faces", "normals"))
-        return Mesh(jnp.asarray(vertices), jnp.asarray(faces), jnp.asarray(normals))
+        with jax.enable_x64(True):  # as stored, whatever this process computes in
+            return Mesh(jnp.asarray(vertices), jnp.asarray(faces), jnp.asarray(normals))
 
     def missing_of(self, number: int, *, check: bool = False) -> list[int]:
         """List the blocks of a pass that are not there in full, as `missing` does."""
