@@ -45,37 +45,54 @@ def share(
     filling: Filling | None = None,
 ) -> Shaped[Array, "..."]:
     """Shares an axis out over all devices of the mesh; `filling` is zeros by default."""
-    shape = tuple(array.shape)
+    count = array.shape[axis]
+    if isinstance(array, jax.Array) and len(array.sharding.device_set) > 1:
+        if count % mesh.size == 0:
+            return jax.device_put(array, _sharding(mesh, axis))
+        array = np.asarray(array)  # shared out otherwise, in parts of another size
+
+    def cut(first: int, last: int):
+        return array[(slice(None),) * axis + (slice(first, last),)]
+
+    return place(cut, array.shape, mesh, axis, filling)
+
+
+def place(
+    cut: Callable[[int, int], Shaped[Array | np.ndarray, "..."]],
+    shape: tuple[int, ...],
+    mesh: Mesh,
+    axis: int = 0,
+    filling: Filling | None = None,
+) -> Shaped[Array, "..."]:
+    """Shares out what is cut for each device of this process: its rows, from one to another."""
     count = shape[axis]
     total = math.ceil(count / mesh.size) * mesh.size
-    name, *others = mesh.axis_names
-    rows_of = (name, *others) if others else name
-    sharding = NamedSharding(mesh, PartitionSpec(*[None] * axis, rows_of))
-    if isinstance(array, jax.Array) and len(array.sharding.device_set) > 1:
-        if total == count:
-            return jax.device_put(array, sharding)
-        array = np.asarray(array)  # shared out otherwise, in parts of another size
-    numpy = np if isinstance(array, np.ndarray) else jnp
 
     def rows(first: int, last: int):
-        inside = array[(slice(None),) * axis + (slice(min(first, count), min(last, count)),)]
+        inside = cut(min(first, count), min(last, count))
         if last <= count:
             return inside
-        beyond = max(first, count), last
+        first = max(first, count)
+        numpy = jnp if isinstance(inside, jax.Array) else np
         if filling is None:
-            added = numpy.zeros((*shape[:axis], last - beyond[0], *shape[axis + 1 :]), array.dtype)
+            added = numpy.zeros((*shape[:axis], last - first, *shape[axis + 1 :]), inside.dtype)
         else:
-            added = jnp.moveaxis(jnp.asarray(filling(*beyond), array.dtype), 0, axis)
+            added = jnp.moveaxis(jnp.asarray(filling(first, last), inside.dtype), 0, axis)
         return numpy.concatenate([inside, added], axis)
 
-    shape = (*shape[:axis], total, *shape[axis + 1 :])
-    places = sharding.addressable_devices_indices_map(shape)
+    sharding, whole = _sharding(mesh, axis), (*shape[:axis], total, *shape[axis + 1 :])
     parts = [
         jax.device_put(rows(*index[axis].indices(total)[:2]), device)
-        for device, index in places.items()
+        for device, index in sharding.addressable_devices_indices_map(whole).items()
         if index is not None
     ]
-    return jax.make_array_from_single_device_arrays(shape, sharding, parts)
+    return jax.make_array_from_single_device_arrays(whole, sharding, parts)
+
+
+def _sharding(mesh: Mesh, axis: int) -> NamedSharding:
+    name, *others = mesh.axis_names
+    names = (name, *others) if others else name
+    return NamedSharding(mesh, PartitionSpec(*[None] * axis, names))
 
 
 def whole(array: Shaped[Array | np.ndarray, "..."], mesh: Mesh) -> Shaped[Array, "..."]:
@@ -87,7 +104,7 @@ def whole(array: Shaped[Array | np.ndarray, "..."], mesh: Mesh) -> Shaped[Array,
     return jax.make_array_from_single_device_arrays(array.shape, sharding, parts)
 
 
-def last_of(array: Shaped[Array, "v ..."]) -> Filling:
+def last_of(array: Shaped[Array | np.ndarray, "v ..."]) -> Filling:
     """Fills with what the last row has, so that a box around all points stays what it is."""
 
     def rows(first: int, last: int):
@@ -96,10 +113,10 @@ def last_of(array: Shaped[Array, "v ..."]) -> Filling:
     return rows
 
 
-def own_numbers(array: Shaped[Array, "v n"]) -> Filling:
+def own_numbers(width: int) -> Filling:
     """Fills rows of neighbors with the number of the row itself."""
 
     def rows(first: int, last: int):
-        return jnp.broadcast_to(jnp.arange(first, last)[:, None], (last - first, array.shape[1]))
+        return jnp.broadcast_to(jnp.arange(first, last)[:, None], (last - first, width))
 
     return rows

@@ -26,8 +26,8 @@ def check_data(
 ) -> tuple[Float[Array, "v 3"], Float[Array, "..."], Float[Array, " v"]]:
     """Converts observed, albedo and weights to the transfer's dtype.
 
-    Without weights they are one, and zero at a point without a normal, as where a transfer is
-    filled up for several devices.
+    Without weights they are one, and zero at a point that has neither coefficients nor a normal:
+    with such ones a transfer is filled up for several devices.
 
     Raises `ValueError` for shapes that do not fit, and, where values are known, for data that
     are not finite, all zero, or weighted by less than 0.
@@ -38,7 +38,8 @@ def check_data(
     albedo = checked_albedo(albedo, count, dtype)
     weights = None if weights is None else as_float(weights, "weights").astype(dtype)
     if weights is None:
-        weights = jnp.any(transfer.normals != 0, axis=-1).astype(dtype)
+        sees = jnp.any(transfer.coefficients != 0, axis=-1)
+        weights = (sees | jnp.any(transfer.normals != 0, axis=-1)).astype(dtype)
     _check_shapes(observed, weights, count)
     _check_values(observed, weights)
     return observed, albedo, weights

@@ -119,6 +119,16 @@ class BlockStore:
             result[block * size : (block + 1) * size] = self.read(name, block)
         return result
 
+    def stretch(self, name: str, start: int, stop: int) -> np.ndarray:
+        """Read the vertices from one to another; raises `DamagedError` as `read` does."""
+        array = self._array(name)
+        size = array.chunks[0]
+        parts = [np.empty((0, *array.shape[1:]), array.dtype)]
+        for block in range(start // size, -(-stop // size) if stop > start else 0):
+            first = block * size
+            parts.append(self.read(name, block)[max(start - first, 0) : stop - first])
+        return np.concatenate(parts)
+
     def write(self, name: str, block: int, values: np.ndarray) -> None:
         """Write one block: its file is there whole, or not at all.
 

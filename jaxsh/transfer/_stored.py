@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Array
 
 from .._core.checks import as_path
+from .._core.devices import Devices, last_of, mesh_of, own_numbers, place
 from ..harmonics import degree_of
 from ._store import BlockStore
 from ._transfer import Transfer
@@ -78,6 +79,30 @@ class StoredTransfer:
             jnp.asarray(normals),
             jnp.asarray(neighbors),
         )
+
+    def sharded(self, devices: Devices = None) -> Transfer:
+        """Read the transfer shared out over devices, filled up as `Transfer.sharded` does.
+
+        Each process reads what its own devices hold, one device after another, so that a transfer
+        may be larger than the memory of each. Raises `ValueError` as `shard_rows` does, and for a
+        damaged block.
+        """
+        mesh, count = mesh_of(devices), self.num_points
+        last = {name: self._store.stretch(name, max(count - 1, 0), count) for name in _ARRAYS}
+        fillings = {
+            "positions": last_of(last["positions"]),
+            "neighbors": own_numbers(last["neighbors"].shape[1]),
+        }
+        coefficients, positions, normals, neighbors = (
+            place(
+                functools.partial(self._store.stretch, name),
+                (count, *last[name].shape[1:]),
+                mesh,
+                filling=fillings.get(name),
+            )
+            for name in _ARRAYS
+        )
+        return Transfer(coefficients, positions, normals, neighbors)
 
     def shaded(
         self, arrays: Sequence[str], shade: Callable[[slice, Transfer], Array]

@@ -169,7 +169,7 @@ class Transfer(AbstractTransfer):
             share(self.coefficients, mesh),
             share(self.positions, mesh, filling=last_of(self.positions)),
             share(self.normals, mesh),
-            share(self.neighbors, mesh, filling=own_numbers(self.neighbors)),
+            share(self.neighbors, mesh, filling=own_numbers(self.neighbors.shape[1])),
         )
 
     def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:

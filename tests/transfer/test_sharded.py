@@ -8,8 +8,9 @@ from jax.sharding import AxisType, Mesh, NamedSharding
 from jax.sharding import PartitionSpec as P
 from sharding import collectives
 
-from jaxsh import inverse, sphere, transfer
+from jaxsh import geometry, inverse, midrange, sphere, transfer
 from jaxsh.transfer import Material
+from jaxsh.transfer._store import BlockStore
 
 V, W, DEGREE = 33, 34, 2
 DEVICES = jax.devices()[:2]
@@ -119,6 +120,9 @@ def test_slopes_are_those_of_one_device(made, light, rng):
 def fits(observed, made):
     yield inverse.fit_light(observed, made, 0.5, 1, prior=None)
     yield inverse.fit_light(observed, made.normals, 0.5, 1, prior=None)
+    corners = np.array([[-0.2, -0.2, 1.5], [-0.2, 0.2, 1.5], [0.2, 0.2, 1.5], [0.2, -0.2, 1.5]])
+    lamp = midrange.Polygon(corners.astype(np.float32), np.ones(3, np.float32))
+    yield inverse.fit_colors(observed, made, 0.5, [lamp])
 
 
 @pytest.mark.slow
@@ -144,6 +148,29 @@ def test_places_of_a_number_that_fits_already_and_of_more_devices_than_points(ma
     shared = transfer.shard_rows(np.arange(4), OVER["explicit"])
     np.testing.assert_array_equal(transfer.shard_rows(shared, DEVICES), np.arange(4))
     np.testing.assert_array_equal(transfer.shard_rows(np.ones(3, bool)), [1, 1, 1, 0])
+
+
+@pytest.mark.parametrize("over", ALL)
+def test_a_store_is_read_as_a_transfer_is_shared_out(over, tmp_path, monkeypatch):
+    knot = geometry.knot(300)
+    faces = knot.faces[np.all(knot.faces < 299, axis=1)]
+    mesh = geometry.Mesh(knot.vertices[:299], faces, knot.normals[:299])
+    store = tmp_path / "knot.zarr"
+    baked = transfer.bake(mesh, 1, directions=16, shadows=False, store=store, progress=False)
+    reads, read = [], BlockStore.read
+    monkeypatch.setattr(
+        BlockStore, "read", lambda *arguments: (reads.append(arguments[1:]), read(*arguments))[1]
+    )
+    found = transfer.open(store).sharded(OVER[over])
+    for array, expected in zip(
+        jax.tree.leaves(found), jax.tree.leaves(baked.sharded(OVER[over])), strict=True
+    ):
+        np.testing.assert_array_equal(array, expected)
+        assert array.dtype == expected.dtype
+        assert array.sharding == expected.sharding
+    # Blocks of 64: the third is in both parts, and the last row has been looked at before.
+    blocks = [block for name, block in reads if name == "coefficients"]
+    assert blocks == [4, 0, 1, 2, 2, 3, 4]
 
 
 def test_a_mesh_of_two_axes_is_shared_out_over_both(made):
