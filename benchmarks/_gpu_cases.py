@@ -21,6 +21,7 @@ class Sizes(NamedTuple):
 
     directions: int
     vertices: tuple[int, ...]
+    tiled: int  # vertices that are grouped in tiles, and repeated up to the others
     polygon_points: int
     picture: int  # rows
     suns: int
@@ -31,8 +32,32 @@ class Sizes(NamedTuple):
     side: int  # of a square matrix
 
 
-FULL = Sizes(10**6, (50_000, 5_000_000), 50_000, 1024, 100_000, 1000, 50_000, 512, 2**28, 8192)
-TINY = Sizes(200, (300,), 20, 32, 20, 2, 300, 16, 2**16, 64)
+FULL = Sizes(
+    directions=10**6,
+    vertices=(50_000, 5_000_000),
+    tiled=50_000,
+    polygon_points=50_000,
+    picture=1024,
+    suns=100_000,
+    exact_suns=1000,
+    bake_vertices=50_000,
+    bake_directions=512,
+    copied=2**28,
+    side=8192,
+)
+TINY = Sizes(
+    directions=200,
+    vertices=(300,),
+    tiled=100,
+    polygon_points=20,
+    picture=32,
+    suns=20,
+    exact_suns=2,
+    bake_vertices=300,
+    bake_directions=16,
+    copied=2**16,
+    side=64,
+)
 
 
 class Case(NamedTuple):
@@ -67,7 +92,7 @@ def cases(sizes: Sizes) -> Iterator[Callable[[], list[Case]]]:
     for vertices in sizes.vertices:
         yield functools.partial(_shading, vertices)
         yield functools.partial(_samples, vertices)
-        yield functools.partial(_tiles, vertices)
+        yield functools.partial(_tiles, vertices, sizes.tiled)
     yield functools.partial(_lat_long, sizes.picture)
     yield functools.partial(_polygons, sizes.polygon_points)
     yield functools.partial(_skies, sizes.suns, sizes.exact_suns)
@@ -229,9 +254,8 @@ def _samples(vertices: int) -> list[Case]:
     ]
 
 
-def _tiles(vertices: int) -> list[Case]:
+def _tiles(vertices: int, part: int) -> list[Case]:
     """Tiles of a part of the mesh, repeated: how they are chosen costs no time in a frame."""
-    part = min(vertices, 50_000)
     made = _made(vertices)
     first = transfer.Transfer(*(leaf[:part] for leaf in jax.tree.leaves(made)))
     small = adaptive.make_tiles(first, _EYE)

@@ -37,6 +37,8 @@ class Options:
 
     sizes: Literal["auto", "full", "tiny"] = "auto"
     """auto: full but on a CPU"""
+    vertices: tuple[int, ...] = ()
+    """of the frames; none: those of the sizes"""
     seconds: float = 340.0
     """what has not begun by then is left out, and said"""
     test_seconds: float = 110.0
@@ -64,6 +66,8 @@ def run(options: Options) -> dict[str, Any]:
     report |= {"machine": describe()} | {"jax": _facts()}
     tiny = options.sizes == "tiny" or (options.sizes == "auto" and jax.default_backend() == "cpu")
     sizes = _gpu_cases.TINY if tiny else _gpu_cases.FULL
+    if options.vertices:
+        sizes = sizes._replace(vertices=options.vertices, tiled=min(sizes.tiled, *options.vertices))
     report["sizes"] = sizes._asdict()
     report["limits"] = limits = {}
     for name, probe in _gpu_limits.probes(sizes.copied, sizes.side):

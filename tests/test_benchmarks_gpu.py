@@ -5,9 +5,11 @@ import subprocess
 import sys
 
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from benchmarks import _gpu_cases, _gpu_limits, gpu
+from jaxsh import adaptive, sphere, transfer
 
 
 def test_a_case_is_set_beside_its_limit():
@@ -47,6 +49,21 @@ def test_colors_in_tf32_are_set_beside_full_ones():
 def test_the_data_sheet_is_found_by_the_device():
     assert _gpu_limits.vendor("NVIDIA H200") == _gpu_limits.VENDOR["H200"]
     assert _gpu_limits.vendor("cpu") is None
+
+
+@pytest.mark.slow
+def test_tiles_are_repeated():
+    [case] = _gpu_cases._tiles(300, 100)
+    tiles, light, eye, material = case.arguments
+    glossy = transfer.Material(0.0, material.specular, material.exponent)
+    parts = case.function(tiles, light, eye, glossy).reshape(3, 100, 3)
+    assert (parts[1:] == parts[:1]).all()
+    assert jnp.ptp(parts) > 0
+    # The first third of the points by themselves.
+    points = sphere.fibonacci(300).directions[:100].astype(np.float32)
+    made = transfer.unshadowed(points, points, 10)
+    alone = adaptive.make_tiles(made, eye)(light, eye, glossy).color
+    np.testing.assert_allclose(parts[0], alone, rtol=0, atol=1e-6)
 
 
 @pytest.mark.slow
