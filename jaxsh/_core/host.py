@@ -1,10 +1,14 @@
 """Facts about the machine that runs Python."""
 
 import functools
+import math
 import os
 
 import jax
 import numpy as np
+from jaxtyping import DTypeLike
+
+_ALIGNMENT = 64  # bytes, of XLA's arrays on a CPU
 
 
 def cores() -> int:
@@ -12,6 +16,17 @@ def cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def aligned(shape: tuple[int, ...], dtype: DTypeLike) -> np.ndarray:
+    """Make room for an array where JAX takes it over on a CPU without a copy.
+
+    By `jax.device_put`, that is, and as long as nobody writes into it.
+    """
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    room = np.empty(size + _ALIGNMENT, np.uint8)
+    start = -room.ctypes.data % _ALIGNMENT
+    return room[start : start + size].view(dtype).reshape(shape)
 
 
 def read_only_cache(maxsize: int | None = 32):

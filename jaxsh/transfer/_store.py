@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from .._core.host import aligned
 from .._core.words import reason
 
 FORMAT, VERSION = "jaxsh transfer store", 1
@@ -79,11 +80,8 @@ class BlockStore:
         return found
 
     def room(self, name: str) -> np.ndarray:
-        """Make room for a block of an array, from an address on that is a multiple of 64."""
-        size = _bytes(self._array(name))
-        room = np.empty(size + 64, np.uint8)
-        start = -room.ctypes.data % 64
-        return room[start : start + size]
+        """Make room for a block of an array with its checksum."""
+        return aligned((_bytes(self._array(name)),), np.uint8)
 
     def read(self, name: str, block: int, room: np.ndarray | None = None) -> np.ndarray:
         """Read one block, read-only; raises `DamagedError` where it is not right.

@@ -173,7 +173,7 @@ def _transfer(mesh: Mesh, coefficients: Float[np.ndarray | Array, "v k"]) -> Tra
     # Where JAX computes in single precision its arrays are single, as those of the mesh become.
     dtype = jax.dtypes.canonicalize_dtype(coefficients.dtype)
     return Transfer(
-        coefficients=jnp.asarray(coefficients, dtype),
+        coefficients=jax.device_put(coefficients.astype(dtype, copy=False)),
         positions=jnp.asarray(mesh.vertices),
         normals=jnp.asarray(mesh.normals),
         neighbors=geometry.neighbors(mesh),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from ..._core.host import cores
+from ..._core.host import aligned, cores
 from ._device import UNDER_WAY, DeviceJob
 from ._gather import TILE
 from ._job import Job
@@ -39,7 +39,7 @@ class Passes:
     ) -> Float[np.ndarray, "v k"]:
         """Compute the coefficients of pass `number`, for which see `Job.rows`."""
         count, store = self.job.num_points, self.store
-        rows = np.empty((count, self.job.width), self.job.dtype)
+        rows = aligned((count, self.job.width), self.job.dtype)
         missing = [slice(0, count)] if store is None else store.fill(number, rows)
         self.bar.update(count - sum(part.stop - part.start for part in missing))
 
