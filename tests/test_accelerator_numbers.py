@@ -19,8 +19,6 @@ ROWS = 2500  # more than a block on a CPU
 CALLS = [
     ("harmonics", "evaluate", 2**30),
     ("harmonics", "product", 2**23),
-    ("sphere", "reconstruct", 2**19),
-    ("transfer", "fixed_view", 2**20),
     ("transfer", "shade_glossy", 2**20),
     ("transfer", "shade_sun.glossy", 2**24),
 ]

@@ -44,7 +44,7 @@ def calls():
     def shining(suns, made, seen, eye, material):
         return t.shade_sun(suns, made, visibility(seen, suns), material=material, eye=eye)
 
-    disc = made_by(sphere.Suns, floats(16, 3), floats(16), floats(16, 3))
+    discs = made_by(sphere.Suns, floats(16, 3), floats(16), floats(16, 3))
     return {
         "FixedLight.__call__": of(
             lambda still, eye, material: still(eye, material), still, eye, material()
@@ -68,10 +68,8 @@ def calls():
         "shade_glossy": of(t.shade_glossy, light, made, eye, material()),
         "shade_glossy, own lights": of(t.shade_glossy, own, made, eye, material()),
         "shade_glossy, sampled": of(t.shade_glossy, light, sampled, eye, material()),
-        "shade_sun": of(sunny, suns(), made, booleans(V, 16, 16), albedo),
-        "shade_sun, discs": of(sunny, disc, made, booleans(V, 16, 16), albedo),
+        "shade_sun": of(sunny, discs, made, booleans(V, 16, 16), albedo),
         "shade_sun.glossy": of(shining, suns(), made, booleans(V, 16, 16), eye, material()),
-        "shade_sun.glossy, discs": of(shining, disc, made, booleans(V, 16, 16), eye, material()),
         "unshadowed": of(
             lambda p, n, near: t.unshadowed(p, n, DEGREE, neighbors=near),
             floats(V, 3),
