@@ -67,6 +67,19 @@ def test_tiles_are_repeated():
 
 
 @pytest.mark.slow
+def test_it_ends_in_time_with_what_there_is(tmp_path):
+    out = tmp_path / "gpu.json"
+    options = ["--sizes", "tiny", "--test-seconds", "0", "--out", str(out), "--at-most", "1e-3"]
+    command = [sys.executable, "-m", "benchmarks.gpu", *options]
+    said = subprocess.run(command, cwd=gpu.ROOT, stdout=subprocess.PIPE, text=True, check=False)
+    assert said.returncode == 1
+    report = json.loads(said.stdout)
+    assert report == json.loads(out.read_text("utf-8"))
+    assert report["cases"] == []
+    assert report["left_out"] == ["all after the last case: the time was over"]
+
+
+@pytest.mark.slow
 def test_every_case_runs(tmp_path):
     # In a process of its own, as at a user's: the session's strictness is not for it.
     out = tmp_path / "gpu.json"

@@ -28,6 +28,8 @@ CALLED = {
     "sky": {"fit"},
 }
 
+SLOW = ("adaptive", "harmonics", "imaging", "inverse", "midrange", "sky", "transfer")
+
 
 def precisions(program: core.Jaxpr) -> Iterator[object]:
     """The precision of each product of matrices, on all platforms."""
@@ -89,15 +91,7 @@ def seen(call: valid_calls.Call, monkeypatch) -> set[object]:
 
 @pytest.mark.parametrize(
     "module",
-    [
-        "sphere",
-        *(
-            pytest.param(module, marks=pytest.mark.slow)
-            for module in (
-                *("adaptive", "harmonics", "imaging", "inverse", "midrange", "sky", "transfer"),
-            )
-        ),
-    ],
+    ["sphere", *(pytest.param(module, marks=pytest.mark.slow) for module in SLOW)],
 )
 def test_shading_obeys_and_nothing_else(module, monkeypatch):
     obeys = set()

@@ -46,8 +46,9 @@ def shade_diffuse(
 
     **Returns** (..., V, 3), in the dtype of the transfer. Linear in light, coefficients and
     albedo, and differentiable in each, forward and reverse; the positions and normals of the
-    transfer do not enter. For a `StoredTransfer` a NumPy array, without derivatives and outside
-    `jit`.
+    transfer do not enter. Float32 is multiplied in full, or as `jax.default_matmul_precision` says
+    where it is set (`docs/devices.md`). For a `StoredTransfer` a NumPy array, without derivatives
+    and outside `jit`.
 
     Raises `ValueError` for shapes that do not fit, and for a light or an albedo that is at hand
     (`docs/conventions.md`) and not finite, or an albedo below 0.
