@@ -24,6 +24,14 @@ def rows_are_split(array) -> bool:
     return jax.typeof(array).sharding.spec[:1] not in ((), (None,))
 
 
+def cpu_alone() -> bool:
+    """True where JAX has no accelerator: what is slow to trace for one need then not be traced.
+
+    `tests/test_accelerator.py` says no to it, and so sees what an accelerator would get.
+    """
+    return jax.default_backend() == "cpu"
+
+
 def materialize(function, *arguments):
     """`function(*arguments)`, computed once and stored, where XLA would fuse it into each consumer.
 
@@ -59,18 +67,25 @@ def rounded_once(function, *arguments):
     return jax.lax.optimization_barrier(materialize(function, *arguments))
 
 
-def in_turn(function, tree):
+def in_turn(function, tree, *, most: int | None = None):
     """`function` of each row of a tree of arrays: one after the other on one CPU, else all at once.
 
-    For rows that are large themselves, where a batch would only leave the cache.
+    For rows that are large themselves, where a batch would only leave the cache. `most` is the
+    number of rows that an accelerator takes at once, as far as its memory goes.
     """
+    rows = len(jax.tree.leaves(tree)[0])
 
     def loop(tree):
         return jax.lax.map(function, tree)
 
+    def batched(tree):
+        if most is None or rows <= most:
+            return jax.vmap(function)(tree)
+        return jax.lax.map(jax.checkpoint(function), tree, batch_size=most)
+
     if on_mesh(tree):
         return jax.vmap(function)(tree)
-    return jax.lax.platform_dependent(tree, cpu=loop, default=jax.vmap(function))
+    return jax.lax.platform_dependent(tree, cpu=loop, default=batched)
 
 
 def varying_as(tree, like):

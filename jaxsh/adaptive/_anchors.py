@@ -248,7 +248,11 @@ def _shade_anchors(light, eye, material, anchors, limits, distant, normalized):
     base_polynomial = lobe_polynomial(material.exponent, anchors.base.degree, normalized)
     width = (anchors.base.degree + 1) ** 2
     base = lobe_products(light[:, :width], anchors.base, axis, base_polynomial)
-    at_anchors = everywhere(lambda i: in_full(anchors.anchors[i]), len(anchors.anchors))
+
+    def some_anchors(rows):
+        return in_full(anchors.anchors if rows is None else anchors.anchors[rows])
+
+    at_anchors = everywhere(some_anchors, len(anchors.anchors))
     rest = at_anchors - base[:, anchors.anchors]
     spread, carried = materialize(_between, rest, anchors.nearest, anchors.weights, base)
     albedo = material.specular

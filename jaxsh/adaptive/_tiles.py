@@ -10,7 +10,7 @@ from jaxtyping import Array, ArrayLike, Float, Int, Int8
 
 from .._core.checks import check_flag, check_size, check_type
 from .._core.linalg import matmul
-from .._core.xla import materialize
+from .._core.xla import in_turn, materialize
 from ..harmonics import degree_of, evaluate, phong, rotate
 from ..transfer import AbstractTransfer, Material, Transfer, shade_diffuse
 from ..transfer._glossy_kernels import (
@@ -38,6 +38,8 @@ from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling
 
 DIRECTIONS = 40
 EXPONENT = 32.0
+# Blocks that an accelerator arranges at once: 0.3 GB of coefficients of degree 10.
+_MOST = 4096
 
 
 class TileSet(eqx.Module):
@@ -247,7 +249,7 @@ def _arrange(transfer, tiling, directions, rows, quantized):
         samples = matmul(rows[tile], coefficients.T)
         return in_steps(samples, 1) if quantized else (samples, jnp.ones_like(samples[:, 0]))
 
-    samples, scales = jax.lax.map(sampled, (tiling.permutation, tiling.tile))
+    samples, scales = in_turn(sampled, (tiling.permutation, tiling.tile), most=_MOST)
     basis = evaluate(directions, transfer.degree, axis=0)
     order = tiling.permutation.reshape(-1)
     positions, normals = rows_of(transfer.positions[order], transfer.normals[order])

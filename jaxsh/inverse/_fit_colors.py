@@ -18,6 +18,7 @@ from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from .._core.checks import check_all, check_number
 from .._core.linalg import einsum, in_full, matmul
+from .._core.xla import in_turn
 from ..midrange import Polygon
 from ..transfer import Transfer
 from ._checks import check_data, check_end, check_solver
@@ -129,7 +130,7 @@ def _recover(observed, transfer, albedo, weights, lights, upper, *, tolerance, m
     albedo = albedo.reshape((1,) * (2 - albedo.ndim) + albedo.shape)
     factor = jnp.broadcast_to(weights[:, None] * albedo / (math.pi * norm), seen.shape)
     solver = _box_solver(max_steps, tolerance)
-    channels = jax.lax.map(
+    channels = in_turn(
         lambda rows: _channel(solver, rows[0][:, None] * shading, rows[1], upper),
         (factor.T, seen.T / norm),
     )

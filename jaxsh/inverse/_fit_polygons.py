@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import check_all, check_flag, check_type, is_concrete
-from .._core.xla import on_mesh
+from .._core.linalg import einsum
+from .._core.xla import in_turn, on_mesh
 from ..midrange import Polygon
 from ..transfer import Transfer
 from ._checks import check_data, check_end, check_solver
@@ -20,6 +21,10 @@ from ._rectangle import Rectangle, moved, rectangle_of
 from ._result import Recovered, Statistics
 from ._shading import irradiance
 from ._solve import confidence, everywhere, levenberg_marquardt
+
+# Vertices, each once for each light, that an accelerator takes at once; and of starts as many as
+# have so many slopes of coefficients, four numbers each: 4 GB.
+_MOST, _NUMBERS = 2**18, 2**28
 
 
 def fit_polygons(
@@ -185,6 +190,7 @@ def _recover(observed, transfer, albedo, weights, guesses, *, turn, tolerance, m
         tolerance=tolerance,
         max_steps=max_steps,
         normal=on_mesh(observed, transfer),
+        most=max(1, _NUMBERS // (transfer.coefficients.size * still.shape[1])),
     )
     value = decode(solved.parameters, jax.tree.map(lambda leaf: leaf[solved.start], guesses))
     squared = jnp.sum(solved.residual**2)
@@ -206,12 +212,11 @@ def _recover(observed, transfer, albedo, weights, guesses, *, turn, tolerance, m
 
 
 def _irradiance(lights: Rectangle, transfer: Transfer) -> Float[Array, "v 3"]:
-    """Irradiance of all lights together. In a loop: XLA compiles one light, not each."""
+    """Irradiance of all lights together. XLA compiles one light, not each."""
 
-    def add(total, light):
+    def one(light):
         # One channel is enough: the color is a factor.
-        white = Polygon(light.vertices, jnp.ones(3, total.dtype))
-        return total + irradiance(white, transfer)[:, None] * light.radiance[None], None
+        return irradiance(Polygon(light.vertices, jnp.ones(3, transfer.dtype)), transfer)
 
-    none = jnp.zeros_like(transfer.positions)
-    return jax.lax.scan(add, none, lights)[0]
+    most = max(1, _MOST // max(transfer.num_points, 1))
+    return einsum("lv,lc->vc", in_turn(one, lights, most=most), lights.radiance)

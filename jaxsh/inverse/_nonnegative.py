@@ -11,6 +11,7 @@ from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Bool, Float
 
 from .._core.linalg import matmul
+from .._core.xla import in_turn
 
 # Of the way to the nearest bound, how much is gone; of the gap, how much remains to be aimed at.
 _FAR, _CENTER = 0.99, 0.1
@@ -32,7 +33,7 @@ def nonnegative(
     def one(pair):
         return _nearest(pair[0], pair[1], rows, tolerance, max_steps)
 
-    moved, met, done = jax.lax.map(one, (light, inverse))
+    moved, met, done = in_turn(one, (light, inverse))
     return moved, jnp.any(met), jnp.all(done)
 
 

@@ -3,11 +3,11 @@
 import math
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._core.linalg import einsum
+from .._core.xla import in_turn
 from ..midrange import Polygon, polygon_harmonics
 from ..transfer import Transfer
 from ._solve import triangle
@@ -58,7 +58,7 @@ def compress(
         return triangle(jnp.concatenate([shading, b], axis=1))
 
     columns = (seen / scale)[None] if shared else (seen / scale).T[..., None]
-    triangles = jax.lax.map(of_channel, (albedo.T, columns))
+    triangles = in_turn(of_channel, (albedo.T, columns))
     operator, target = triangles[..., :count], triangles[..., count:]
     return Shading(jnp.moveaxis(target, -1, 0 if shared else 1).reshape(3, -1), operator, scale)
 

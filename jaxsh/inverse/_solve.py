@@ -13,7 +13,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, Int
 
 from .._core.linalg import einsum, matmul, triangle
-from .._core.xla import keep_rows
+from .._core.xla import cpu_alone, in_turn, keep_rows
 from ._result import Confidence
 
 # Ends whose residuals differ by less than this, in units of the data, are in the same valley.
@@ -53,6 +53,7 @@ def levenberg_marquardt(
     tolerance: float,
     max_steps: int,
     normal: bool = False,
+    most: int | None = None,
 ) -> Solved:
     """Finds the least ‖residual‖² that any of the starts leads to; residuals in units of the data.
 
@@ -61,6 +62,10 @@ def levenberg_marquardt(
 
     `normal`: each step by its normal equations instead of QR. It loses digits of a step, not of the
     end, and sums over residuals that several devices share where QR would gather them.
+
+    On a CPU one start comes after the other: each stops when it is done, and XLA compiles this
+    three times as fast as all side by side, which is what keeps an accelerator busy: `most` at
+    once, as far as its memory goes.
     """
     linear = lx.Normal(lx.Cholesky()) if normal else lx.QR()
     solver = optx.LevenbergMarquardt(tolerance, tolerance, linear_solver=linear)
@@ -70,14 +75,19 @@ def levenberg_marquardt(
         value = residual(p, constants)
         return value, value
 
-    @jax.jit  # traced once for both ways below
+    @jax.jit  # traced once for both ways of `in_turn`
     def one(p, args):
         solution = optx.least_squares(
             with_itself, solver, p, args, has_aux=True, max_steps=max_steps, throw=False
         )
         return solution.value, solution.aux, solution.result, solution.stats["num_steps"]
 
-    values, residuals, results, steps = _from_each(one, starts, constants)
+    def each(pair):
+        return one(*pair)
+
+    pairs = starts, constants
+    ends = jax.lax.map(each, pairs) if cpu_alone() else in_turn(each, pairs, most=most)
+    values, residuals, results, steps = ends
     costs = jnp.sum(residuals**2, axis=-1)
     costs = jnp.where(jnp.isfinite(costs), costs, jnp.inf)
     same = jnp.linalg.norm(residuals - residuals[jnp.argmin(costs)][None], axis=-1) < _SAME
@@ -85,21 +95,6 @@ def levenberg_marquardt(
     best = jnp.argmin(jnp.where(jnp.where(done.any(), done, same), costs, jnp.inf))
     result = jax.tree.map(lambda r: r[best], results)
     return Solved(values[best], residuals[best], result, steps[best], best, jnp.sum(same))
-
-
-def _from_each(one, starts, constants):
-    """Calls `one(start, constants)` for each start.
-
-    On the CPU one after the other: each stops when it is done, and XLA compiles this three times
-    as fast as all side by side, which is what keeps an accelerator busy.
-    """
-
-    def in_turn(*arguments):
-        return jax.lax.map(lambda start: one(*start), arguments)
-
-    if jax.default_backend() == "cpu":  # there is no accelerator: the other way is not even traced
-        return in_turn(starts, constants)
-    return jax.lax.platform_dependent(starts, constants, cpu=in_turn, default=jax.vmap(one))
 
 
 def everywhere(function: Callable[..., Any], *arguments: Any) -> Any:

@@ -5,11 +5,10 @@ Derived in docs/near_light_polygons.md, "What is seen".
 
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from .._core.xla import varying_as
+from .._core.xla import in_turn
 from ._arcs import Arcs, Rows, Vectors, resting_arcs
 from ._vectors import cross, dot, reciprocal, scale, select
 
@@ -92,25 +91,21 @@ def within(
     where it is the opposite.
     """
     limit = (_ONE_PLANE * jnp.finfo(planes.dtype).eps) ** 2
-
-    def by_plane(part, outward):
-        low, high = part
-        # The same to the last bit but for the sign, whichever of both planes is the edge's.
-        axis = cross(outward, edges.normal) - cross(edges.normal, outward)
-        same_plane = dot(axis, axis) < 4 * limit
-        first, last = dot(axis, edges.start), dot(axis, edges.end)  # >= 0 is within
-        first_in, last_in = first >= 0, last >= 0
-        share = first * reciprocal(first - last)
-        here = same_plane & (dot(outward, outward) > 0)
-        without = here & ~jnp.where(dot(edges.normal, outward) > 0, along, against)
-        without = without | (~same_plane & ~first_in & ~last_in)
-        low = jnp.where(~same_plane & ~first_in & last_in, jnp.maximum(low, share), low)
-        high = jnp.where(~same_plane & first_in & ~last_in, jnp.minimum(high, share), high)
-        return (low, jnp.where(without, -1, high)), None
-
-    shape = jnp.broadcast_shapes(edges.normal.shape, planes.shape[1:])
-    zero = varying_as(jnp.zeros((*shape[:-2], shape[-1]), planes.dtype), planes)
-    return jax.lax.scan(by_plane, (zero, zero + 1), planes)[0]
+    along = jnp.asarray(along)[None]
+    # The same to the last bit but for the sign, whichever of both planes is the edge's.
+    axis = cross(planes, edges.normal[None]) - cross(edges.normal[None], planes)
+    same_plane = dot(axis, axis) < 4 * limit
+    first, last = dot(axis, edges.start[None]), dot(axis, edges.end[None])  # >= 0 is within
+    first_in, last_in = first >= 0, last >= 0
+    share = first * reciprocal(first - last)
+    here = same_plane & (dot(planes, planes) > 0)
+    facing = dot(edges.normal[None], planes) > 0
+    without = here & ~((facing & along) | (~facing & against))
+    without = without | (~same_plane & ~first_in & ~last_in)
+    low = jnp.where(~same_plane & ~first_in & last_in, share, 0)
+    high = jnp.where(~same_plane & first_in & ~last_in, share, 1)
+    high = jnp.where(jnp.any(without, axis=0), -1, jnp.min(high, axis=0, initial=1))
+    return jnp.max(low, axis=0, initial=0), high
 
 
 def left_over(base: tuple[Number, Number], taken: tuple[Number, Number]) -> tuple[Number, Number]:
@@ -128,15 +123,15 @@ def left_over(base: tuple[Number, Number], taken: tuple[Number, Number]) -> tupl
         return jnp.stack(lows), jnp.stack([jnp.where(some, begin, none)[0], none])
     order = jnp.arange(len(begin), dtype=jnp.int32).reshape(-1, *(1,) * low.ndim)
 
-    def piece(_, start):
-        start, number, there = start
+    def piece(begins):
+        start, number, there = begins
         later = (end > start[None]) | ((end == start[None]) & (order > number))
         covered = jnp.any(some & (begin <= start[None]) & later, axis=0)
         ahead = jnp.where(some & (begin > start[None]), begin, high[None])
         stop = jnp.minimum(jnp.min(ahead, axis=0), high)
-        return None, (start, jnp.where(there & ~covered, jnp.maximum(stop, start), start))
+        return start, jnp.where(there & ~covered, jnp.maximum(stop, start), start)
 
     starts = jnp.concatenate([low[None], end])
     numbers = jnp.arange(-1, len(begin), dtype=jnp.int32)
     there = jnp.concatenate([jnp.ones_like(some[:1]), some])
-    return jax.lax.scan(piece, None, (starts, numbers, there))[1]
+    return in_turn(piece, (starts, numbers, there))

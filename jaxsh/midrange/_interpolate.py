@@ -1,6 +1,7 @@
 """Light at many positions, from the expansions around a few samples."""
 
 import functools
+import math
 from collections.abc import Callable
 from typing import Literal, get_args
 
@@ -11,13 +12,16 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import check_choice, check_type
 from .._core.linalg import matmul
-from .._core.xla import varying_as
+from .._core.xla import on_mesh, varying_as
 from ._expansion import Expansion, check_positions, monomials, term_orders
 from ._weights import Weights
 
 Rule = Literal["none", "half", "full"]
 
-_COLUMNS = 32  # terms at a time: 32 · 3 columns are as fast as more, and compile sooner
+# Terms at a time on one CPU: 32 · 3 columns are as fast as more, and compile sooner.
+_COLUMNS = 32
+# Factors of all positions at a time elsewhere, as far as memory goes: half a gigabyte.
+_FACTORS = 2**27
 
 
 def interpolate(
@@ -77,15 +81,7 @@ def _interpolate(expansions, weights, positions, rule):
         samples = cells.samples[cells.cell[cells.rows[:, 0]]]
         points, terms = points[samples], terms[samples]
 
-    def add(total, values, points, terms):
-        offsets = positions[..., :, None, :] - points[..., None, :, :]
-        factors = values[..., None] * monomials(offsets, order)
-        factors = factors.reshape(*factors.shape[:-2], -1)
-        rows = jnp.moveaxis(terms, -1, -3).reshape(*terms.shape[:-4], factors.shape[-1], -1)
-        return total + matmul(factors, rows)
-
-    start = jnp.zeros((*positions.shape[:-1], shape[1] * shape[2]), terms.dtype)
-    light = over_samples(add, start, values, points, terms)
+    light = by_samples(None, positions, values, points, terms, order)
     if cells is not None:
         light = light.reshape(-1, light.shape[-1])[cells.place]
     return light.reshape(shape)
@@ -118,16 +114,52 @@ def take_rows(array: Float[Array, "v n"], rows: Array) -> Float[Array, "blocks s
     return array.at[rows].get(mode="fill", fill_value=0)
 
 
-def over_samples(
-    add: Callable[..., Array],
-    total: Array,
+def by_samples(
+    add: Callable[..., Array] | None,
+    positions: Float[Array, "*blocks v 3"],
     values: Float[Array, "*blocks v n"],
     points: Float[Array, "*blocks n 3"],
     terms: Float[Array, "*blocks n 3 k m"],
+    order: int,
+    finish: Callable[[Array], Array] = lambda light: light,
+) -> Array:
+    """`finish` of the light (*blocks, v, 3K) that weighted expansions make at positions.
+
+    On one CPU, and where samples are few, the same by `add` of a few samples to what there is,
+    `total = add(total, values, points, terms)`, where that is faster (None: where it is not).
+    """
+
+    def blend(total, values, points, terms):
+        offsets = positions[..., :, None, :] - points[..., None, :, :]
+        factors = values[..., None] * monomials(offsets, order)
+        factors = factors.reshape(*factors.shape[:-2], -1)
+        rows = jnp.moveaxis(terms, -1, -3).reshape(*terms.shape[:-4], factors.shape[-1], -1)
+        return total + matmul(factors, rows)
+
+    def in_columns(*parts):
+        if add is None:
+            return finish(_over_samples(blend, light, parts, _COLUMNS))
+        return _over_samples(add, jnp.zeros(positions.shape, terms.dtype), parts, _COLUMNS)
+
+    def at_once(*parts):
+        most = max(_COLUMNS, _FACTORS // max(math.prod(positions.shape[:-1]), 1))
+        return finish(_over_samples(blend, light, parts, most))
+
+    light = jnp.zeros((*positions.shape[:-1], math.prod(terms.shape[-3:-1])), terms.dtype)
+    if terms.shape[-4] * terms.shape[-1] <= _COLUMNS:
+        return in_columns(values, points, terms)
+    if on_mesh(positions, values, points, terms):
+        return at_once(values, points, terms)
+    return lax.platform_dependent(values, points, terms, cpu=in_columns, default=at_once)
+
+
+def _over_samples(
+    add: Callable[..., Array], total: Array, parts: tuple[Array, Array, Array], columns: int
 ) -> Array:
     """total = add(total, values, points, terms), for a few of the n samples after the other."""
+    values, points, terms = parts
     count, axis = values.shape[-1], points.ndim - 2
-    size = min(count, max(1, _COLUMNS // terms.shape[-1]))
+    size = min(count, max(1, columns // terms.shape[-1]))
     steps = -(-count // size)
     if steps == 1:
         return add(total, values, points, terms)
@@ -137,6 +169,6 @@ def over_samples(
         shape = (*array.shape[:axis], steps, size, *array.shape[axis + 1 :])
         return jnp.moveaxis(jnp.pad(array, widths).reshape(shape), axis, 0)
 
-    parts = split(values, values.ndim - 1), split(points, axis), split(terms, axis)
-    start = varying_as(total, (total, parts))
-    return lax.scan(lambda total, part: (add(total, *part), None), start, parts)[0]
+    cut = split(values, values.ndim - 1), split(points, axis), split(terms, axis)
+    start = varying_as(total, (total, cut))
+    return lax.scan(lambda total, part: (add(total, *part), None), start, cut)[0]

@@ -13,7 +13,7 @@ from .._core.linalg import shading_matmul
 from ..transfer import Transfer
 from ..transfer._glossy_kernels import checked_albedo
 from ._expansion import Expansion, monomial_list
-from ._interpolate import Rule, check_weights, over_samples, rule_terms, take_rows
+from ._interpolate import Rule, by_samples, check_weights, rule_terms, take_rows
 from ._weights import Weights
 
 
@@ -30,7 +30,8 @@ def shade(
     What `shade_diffuse` makes of `extrapolate` (one sample) or `interpolate` (many), in another
     order: the transfer is multiplied with all terms of the expansions first, T · [c, ∇c], and
     what is left, 3·M numbers per vertex and sample, with the offset's powers and the weights. The
-    light of each vertex, K·3 numbers, is never stored.
+    light of each vertex, K·3 numbers, is never stored. (Of many samples it is, but on one CPU: a
+    product of two large matrices is what an accelerator likes.)
 
     **Arguments**
 
@@ -111,7 +112,11 @@ def _shade(expansions, coefficients, positions, albedo, weights, rule):
             total = total + values[..., sample : sample + 1] * said
         return total
 
-    radiance = over_samples(add, jnp.zeros(positions.shape, dtype), values, points, terms)
+    def reflect(light):
+        light = light.reshape(*light.shape[:-1], 3, -1)
+        return jnp.sum(light * coefficients[..., None, :], axis=-1)
+
+    radiance = by_samples(add, positions, values, points, terms, order, reflect)
     if cells is not None:
         radiance = radiance.reshape(-1, 3)[cells.place]
     return jnp.multiply(*align(radiance, albedo / math.pi))

@@ -25,10 +25,14 @@ from .._core.checks import (
 )
 from .._core.linalg import matmul
 from .._core.xla import in_turn
-from ..harmonics import evaluate, evaluate_with_gradient
+from ..harmonics import evaluate, evaluate_with_gradient, num_coefficients
 from ..sphere import fibonacci
 from ._emitters import EmissiveMesh, Polygon, Sphere
 from ._surfaces import Emitter, spheres, triangles
+
+# Basis values of samples that an accelerator has at once: 0.3 GB, and in reverse mode of
+# the gradient nine times that.
+_MOST = 2**26
 
 
 class SurfaceSamples(eqx.Module):
@@ -151,7 +155,9 @@ def _at_points(project, samples, point, degree):
     point = point.astype(samples.points.dtype)
     if point.ndim == 1:
         return project(samples, point, degree)
-    rows = in_turn(functools.partial(project, samples, degree=degree), flatten_batch(point))
+    most = max(1, _MOST // max(len(samples.areas) * num_coefficients(degree), 1))
+    each = functools.partial(project, samples, degree=degree)
+    rows = in_turn(each, flatten_batch(point), most=most)
     return jax.tree.map(lambda a: a.reshape(*point.shape[:-1], *a.shape[1:]), rows)
 
 

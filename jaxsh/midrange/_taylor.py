@@ -28,6 +28,8 @@ from ._expansion import Expansion
 from ._moments import moment_tables, moments
 
 _ORDERS = range(4)
+# Numbers of cubes' radiance that an accelerator takes at once; order 3 makes 13 of each.
+_MOST = 2**25
 
 
 def taylor(cube: RadianceCube, degree: int, order: int) -> Expansion:
@@ -93,7 +95,8 @@ def each(function: Callable[..., Array], cube: RadianceCube, tables: Any, *, sta
         shape = leaves[0].shape[:batch]
         flat = [row.reshape(math.prod(shape), *row.shape[batch:]) for row in leaves[: len(rows)]]
         flat = jax.tree.unflatten(cubes, flat)
-        result = in_turn(lambda cube: function(cube, tables, *static), flat)
+        most = max(1, _MOST // math.prod(cube.radiance.shape[batch:]))
+        result = in_turn(lambda cube: function(cube, tables, *static), flat, most=most)
         return result.reshape(*shape, *result.shape[1:])
 
     ndims = (*(row.ndim - batch for row in rows), *(constant.ndim for constant in constants))
