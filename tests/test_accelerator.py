@@ -15,6 +15,12 @@ from lowered.derivative import is_float, with_gradient
 PLATFORMS = ("cuda", "tpu")
 
 
+@pytest.fixture(autouse=True)
+def _accelerator(monkeypatch):
+    """What is traced only where there is an accelerator is traced here."""
+    monkeypatch.setattr("jaxsh.inverse._solve.cpu_alone", lambda: False)
+
+
 @functools.cache
 def traced(module: str, name: str) -> jax.stages.Traced:
     """A call of the table, with its derivative in reverse mode, traced for no platform yet."""

@@ -91,7 +91,7 @@ def within(
     where it is the opposite.
     """
     limit = (_ONE_PLANE * jnp.finfo(planes.dtype).eps) ** 2
-    along = jnp.asarray(along)[None]
+    along = along if isinstance(along, bool) else along[None]
     # The same to the last bit but for the sign, whichever of both planes is the edge's.
     axis = cross(planes, edges.normal[None]) - cross(edges.normal[None], planes)
     same_plane = dot(axis, axis) < 4 * limit

@@ -8,15 +8,18 @@ running on the host needs no reason.
 import functools
 import types
 
-from . import geometry, harmonics, imaging, sky, sphere, transfer
+from . import adaptive, geometry, harmonics, imaging, inverse, midrange, sky, sphere, transfer
 from .shared import DEGREE, Call, K, V
 
 __all__ = ["DEGREE", "MODULES", "K", "V", "table", "without"]
 
 MODULES: dict[str, types.ModuleType] = {
+    "adaptive": adaptive,
     "geometry": geometry,
     "harmonics": harmonics,
     "imaging": imaging,
+    "inverse": inverse,
+    "midrange": midrange,
     "sky": sky,
     "sphere": sphere,
     "transfer": transfer,
