@@ -67,12 +67,12 @@ class BlockStore:
 
         With `check` also those whose checksum is wrong, which takes reading them all.
         """
-        array, found = self._array(name), []
+        array, room, found = self._array(name), self.room(name), []
         for block in range(_blocks(array)):
             try:
                 right = self._file(name, block).stat().st_size == _bytes(array)
                 if right and check:
-                    self.read(name, block)
+                    self.read(name, block, room)
             except (OSError, DamagedError):
                 right = False
             if not right:
@@ -111,10 +111,10 @@ class BlockStore:
 
     def whole(self, name: str) -> np.ndarray:
         """Read an array; raises `DamagedError` for the first block that is not right."""
-        array = self._array(name)
-        result, size = np.empty(array.shape, array.dtype), array.chunks[0]
+        array, room = self._array(name), self.room(name)
+        result, size = aligned(array.shape, array.dtype), array.chunks[0]
         for block in range(_blocks(array)):
-            result[block * size : (block + 1) * size] = self.read(name, block)
+            result[block * size : (block + 1) * size] = self.read(name, block, room)
         return result
 
     def stretch(self, name: str, start: int, stop: int) -> np.ndarray:
@@ -141,7 +141,7 @@ class BlockStore:
                 f"{self._file(name, block)}: cannot be written: {reason(error)}; the blocks that "
                 "are finished are kept, and the same call goes on from them"
             )
-            raise OSError(error.errno, said) from error
+            raise _like(error, said) from error
 
     def put(self, name: str, values: np.ndarray) -> None:
         """Write an array's blocks, those that are there and right already excepted."""
@@ -212,7 +212,7 @@ def make(
             store.put(name, array)
         temporary.replace(path)
     except OSError as error:
-        raise OSError(error.errno, f"{path}: cannot be written: {reason(error)}") from error
+        raise _like(error, f"{path}: cannot be written: {reason(error)}") from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return BlockStore(path)
@@ -268,6 +268,10 @@ def _checked(path: Path, group: Any, name: str) -> Any:
     ):
         raise ValueError(f"{path}: {name} are not in the chunks that jaxsh writes")
     return array
+
+
+def _like(error: OSError, said: str) -> OSError:
+    return OSError(said) if error.errno is None else OSError(error.errno, said)
 
 
 def _blocks(array: Any) -> int:

@@ -72,13 +72,9 @@ class StoredTransfer:
 
     def load(self) -> Transfer:
         """Read the whole transfer into memory; raises `ValueError` for a damaged block."""
-        coefficients, positions, normals, neighbors = map(self._store.whole, _ARRAYS)
-        return Transfer(
-            jnp.asarray(coefficients),
-            jnp.asarray(positions),
-            jnp.asarray(normals),
-            jnp.asarray(neighbors),
-        )
+        arrays = (jax.device_put(self._store.whole(name)) for name in _ARRAYS)
+        coefficients, positions, normals, neighbors = arrays
+        return Transfer(coefficients, positions, normals, neighbors)
 
     def sharded(self, devices: Devices = None) -> Transfer:
         """Read the transfer shared out over devices, filled up as `Transfer.sharded` does.

@@ -62,11 +62,12 @@ def test_what_is_damaged_is_computed_again(tmp_path, whole, name, damage, after)
     assert not BakeStore(path).missing("origins", check=True)
 
 
-def test_a_block_damaged_in_the_end_is_baked_again(tmp_path, whole):
+def test_blocks_damaged_in_the_end_are_baked_again(tmp_path, whole):
     path = tmp_path / "knot"
     run(Scene(), path)
-    hurt(path / "coefficients" / "c" / "3" / "0", "flip")
-    assert BakeStore(path).missing(check=True) == [3]
+    for block in ("3", "10"):  # the last is not full
+        hurt(path / "coefficients" / "c" / block / "0", "flip")
+    assert BakeStore(path).missing(check=True) == [3, 10]
     np.testing.assert_array_equal(run(Scene(), path), whole[0])
     assert BakeStore(path).missing(check=True) == []
     asked = Scene()

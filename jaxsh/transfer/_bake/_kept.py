@@ -97,11 +97,12 @@ class BakeStore(BlockStore):
 
     def fill(self, number: int, rows: Float[np.ndarray, "v k"]) -> list[slice]:
         """Fill in what is there of a pass, and list the runs of rows that are not."""
-        missing = []
+        name, missing = self._pass(number), []
+        room = self.room(name)
         for block in range(self.num_blocks):
             part = self.rows(block)
             try:
-                rows[part] = self.read_pass(number, block)
+                rows[part] = self.read(name, block, room)
             except DamagedError:
                 if missing and missing[-1].stop == part.start:
                     part = slice(missing.pop().start, part.stop)
