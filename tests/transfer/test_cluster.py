@@ -23,7 +23,7 @@ def client():
     """Two workers in this process: what they do is the same as in their own."""
     with (
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
+            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0"
         ) as cluster,
         distributed.Client(cluster) as one,
     ):

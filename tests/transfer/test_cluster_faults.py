@@ -44,7 +44,7 @@ def processes(count=2):
     """Workers of one thread, each a process that is started again where it dies."""
     with (
         distributed.LocalCluster(
-            n_workers=count, threads_per_worker=1, dashboard_address=None
+            n_workers=count, threads_per_worker=1, dashboard_address=":0"
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
@@ -182,7 +182,7 @@ def environment():
 def inside():
     """A client of workers in this process, which start at once."""
     with (
-        distributed.LocalCluster(processes=False, dashboard_address=None) as threads,
+        distributed.LocalCluster(processes=False, dashboard_address=":0") as threads,
         distributed.Client(threads) as client,
     ):
         yield client

@@ -29,8 +29,8 @@ from ._worker import Task, let_go
 # Blocks in the scheduler's hands at once: enough for thousands of workers, and for a bake of any
 # size little of its memory.
 _AHEAD = 4096
-# A cluster or client of our own serves no web page.
-_PLAIN: Any = {"dashboard_address": None}
+# Of a cluster of our own: any free port for its page, so that others keep theirs.
+_PLAIN: Any = {"dashboard_address": ":0"}
 
 
 def bake_on(
@@ -85,7 +85,7 @@ def bake_on(
     >>> from distributed import Client
     >>> from jaxsh import geometry, transfer
     >>> folder = tempfile.TemporaryDirectory()
-    >>> client = Client(processes=False, dashboard_address=None)
+    >>> client = Client(processes=False, dashboard_address=":0")
     >>> mesh = geometry.knot(300)
     >>> with folder as path, client:
     ...     stored = transfer.bake_on(client, mesh, 2, directions=64, store=f"{path}/knot")

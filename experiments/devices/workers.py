@@ -1,0 +1,110 @@
+"""Clusters on this machine, and what their processes use."""
+
+import contextlib
+import itertools
+import math
+import os
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxsh import geometry
+
+
+class Counting:
+    """A ray scene that counts the rays of another, from any thread."""
+
+    def __init__(self, scene: geometry.RayScene):
+        self._scene, self._lock, self.rays = scene, threading.Lock(), 0
+
+    def occluded(self, origins, directions, max_distance=math.inf):
+        with self._lock:
+            self.rays += len(origins)
+        return self._scene.occluded(origins, directions, max_distance)
+
+    def closest_hit(self, origins, directions):
+        with self._lock:
+            self.rays += len(origins)
+        return self._scene.closest_hit(origins, directions)
+
+
+@contextlib.contextmanager
+def processes(count: int) -> Iterator[Any]:
+    """A client of so many worker processes of one thread, without a limit of memory."""
+    from distributed import Client, LocalCluster
+
+    plain: dict[str, Any] = {"dashboard_address": ":0", "memory_limit": None}
+    with (
+        LocalCluster(n_workers=count, threads_per_worker=1, **plain) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+def cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def peak_gigabytes(fresh: bool = False) -> float:
+    """The largest memory that this process has held (Linux; else what it holds now).
+
+    `fresh` starts anew from what it holds now.
+    """
+    import psutil
+
+    with contextlib.suppress(OSError):
+        if fresh:
+            Path("/proc/self/clear_refs").write_text("5")
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return float(next(line for line in lines if line.startswith("VmHWM")).split()[1]) / 1e6
+    return psutil.Process().memory_info().rss / 1e9
+
+
+def cpu_seconds(client: Any = None) -> float:
+    """The processor time of this process so far, and of a client's workers."""
+    own = sum(os.times()[:2])
+    return own + (0 if client is None else sum(client.run(cpu_seconds).values()))
+
+
+def folder_bytes(path: Path) -> int:
+    """The bytes of all files below."""
+    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+
+
+def read_seconds(path: Path) -> float:
+    """Read all files below into one buffer, as fast as a thread does."""
+    files = [file for file in path.rglob("*") if file.is_file()]
+    buffer = np.empty(max(file.stat().st_size for file in files), np.uint8)
+    start = time.perf_counter()
+    for file in files:
+        with file.open("rb", buffering=0) as opened:
+            opened.readinto(buffer)
+    return time.perf_counter() - start
+
+
+def tasks_per_second(client: Any, count: int) -> float:
+    """Run empty tasks, with as large arguments as a block's, as `bake_on` hands them out."""
+    from distributed import as_completed
+
+    about = {f"argument {i}": "0123456789abcdef" for i in range(11)}
+    numbers = iter(range(count))
+    finished = as_completed()
+
+    def submit(most: int) -> None:
+        for number in itertools.islice(numbers, most):
+            finished.add(client.submit(_nothing, about, number, pure=False))
+
+    start = time.perf_counter()
+    submit(4096)
+    for future in finished:
+        future.result()
+        submit(1)
+    return count / (time.perf_counter() - start)
+
+
+def _nothing(about: dict[str, str], number: int) -> None: ...

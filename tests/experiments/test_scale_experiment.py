@@ -1,0 +1,32 @@
+"""Bakes on clusters, timed: the rows are there and agree with each other."""
+
+import pytest
+from runs import run
+
+pytest.importorskip("distributed", reason="needs the extra scale")
+
+
+@pytest.mark.slow
+def test_scale(tmp_path):
+    options = ["--vertices", "500", "--large", "2000", "--tasks", "50", "--directions", "16"]
+    _, rows = run(tmp_path, "scale", *options, small=True)
+    ways = [row for row in rows if row["kind"] == "scaling"]
+    assert [(row["what"], row["processes"]) for row in ways] == [
+        ("one process", 1),
+        ("strong", 1),
+        ("strong", 2),
+        ("weak", 1),
+        ("weak", 2),
+    ]
+    assert ways[0]["relative"] == 100
+    assert all(row["seconds"] > 0 and row["cpu"] > 0 for row in ways)
+    large = {row["what"]: row["value"] for row in rows if row["kind"] == "large"}
+    # 25 numbers of 4 bytes a vertex, in whole blocks with a checksum of 4 bytes.
+    blocks = -(-2000 // 64)
+    assert large["of them coefficients"] * 1e9 == pytest.approx(blocks * (64 * 100 + 4), rel=0.1)
+    assert large["of them before the first block is written"] < large["seconds"]
+    paper = [row for row in rows if row["kind"] == "paper"]
+    assert [row["threads"] for row in paper] == [2, 16, 128, 1024, 8192]
+    # Each line is the one before it, shared by eight times as many.
+    for one, other in zip(paper[:-1], paper[1:], strict=True):
+        assert one["hours"] / other["hours"] == pytest.approx(8, rel=1e-6)
