@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from jaxsh import geometry
 
 
@@ -21,12 +19,12 @@ class Counting:
     def __init__(self, scene: geometry.RayScene):
         self._scene, self._lock, self.rays = scene, threading.Lock(), 0
 
-    def occluded(self, origins, directions, max_distance=math.inf):
+    def occluded(self, origins: Any, directions: Any, max_distance: Any = math.inf) -> Any:
         with self._lock:
             self.rays += len(origins)
         return self._scene.occluded(origins, directions, max_distance)
 
-    def closest_hit(self, origins, directions):
+    def closest_hit(self, origins: Any, directions: Any) -> geometry.Hit:
         with self._lock:
             self.rays += len(origins)
         return self._scene.closest_hit(origins, directions)
@@ -79,7 +77,7 @@ def folder_bytes(path: Path) -> int:
 def read_seconds(path: Path) -> float:
     """Read all files below into one buffer, as fast as a thread does."""
     files = [file for file in path.rglob("*") if file.is_file()]
-    buffer = np.empty(max(file.stat().st_size for file in files), np.uint8)
+    buffer = bytearray(max(file.stat().st_size for file in files))
     start = time.perf_counter()
     for file in files:
         with file.open("rb", buffering=0) as opened:
