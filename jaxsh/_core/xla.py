@@ -169,8 +169,7 @@ def in_blocks(function, *arrays, size: int, most: int | None = None, out: int = 
         return function(*arrays)
     # The accelerator's way too: what it kept for reverse mode would take memory on the CPU as well.
     anew = jax.checkpoint(function)
-    few = most is None or rows <= most
-    default = anew if few else blocks_of(equal_blocks(rows, most))
+    default = anew if most is None or rows <= most else blocks_of(equal_blocks(rows, most))
     return jax.lax.platform_dependent(*arrays, cpu=blocks_of(size), default=default)
 
 
