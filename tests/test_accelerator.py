@@ -8,6 +8,7 @@ import functools
 import jax
 import lowered
 import lowered.loops
+import products
 import pytest
 import valid_calls
 from lowered.derivative import is_float, with_gradient
@@ -37,6 +38,9 @@ def faults(module: str, name: str, platform: str) -> list[str]:
         found.append(f"{program.trips} trips instead of {call.trips}: {program.nests}")
     if program.open > call.open:
         found.append(f"{program.open} loops without a number of trips instead of {call.open}")
+    # Of derivatives too: `test_precision.py` looks at functions alone.
+    if below := set(products.precisions(traced(module, name).jaxpr.jaxpr)) - {products.FULL}:
+        found.append(f"multiplies in {below}")
     return [f"{module}.{name} on {platform}: {fault}" for fault in found]
 
 

@@ -1,7 +1,6 @@
 """One switch of precision: shading obeys JAX's own, everything else multiplies in full."""
 
 import contextlib
-from collections.abc import Iterator
 
 import equinox as eqx
 import jax
@@ -10,10 +9,11 @@ import numpy as np
 import pytest
 import valid_calls
 from jax.extend import core
+from products import FULL, precisions
 
 from jaxsh import sky, sphere, transfer
 
-FULL, CHOSEN = jax.lax.Precision.HIGHEST, jax.lax.Precision.HIGH
+CHOSEN = jax.lax.Precision.HIGH
 
 # Whose products obey. `FixedLight` has none left, and `Levels` is called as `Masks`, by `shade`.
 SHADING = {
@@ -29,25 +29,6 @@ CALLED = {
 }
 
 SLOW = ("adaptive", "harmonics", "imaging", "inverse", "midrange", "sky", "transfer")
-
-
-def precisions(program: core.Jaxpr) -> Iterator[object]:
-    """The precision of each product of matrices, on all platforms."""
-    for equation in program.eqns:
-        precision = equation.params.get("precision")
-        if equation.primitive is core.primitives.dot_general_p and is_inexact(equation.outvars[0]):
-            yield precision[0] if isinstance(precision, tuple) else precision
-        for inner in jax.tree.leaves(tuple(equation.params.values()), is_leaf=is_program):
-            if is_program(inner):
-                yield from precisions(getattr(inner, "jaxpr", inner))
-
-
-def is_inexact(value) -> bool:
-    return jnp.issubdtype(value.aval.dtype, jnp.inexact)
-
-
-def is_program(value) -> bool:
-    return isinstance(value, core.Jaxpr | core.ClosedJaxpr)
 
 
 def single(tree):
