@@ -166,15 +166,17 @@ def bake(
                 kept.finish(said)
     if said:
         warnings.warn(said, UserWarning, stacklevel=2)
-    return _transfer(mesh, coefficients)
+    return _transfer(mesh, coefficients, kept)
 
 
-def _transfer(mesh: Mesh, coefficients: Float[np.ndarray | Array, "v k"]) -> Transfer:
+def _transfer(
+    mesh: Mesh, coefficients: Float[np.ndarray | Array, "v k"], kept: BakeStore | None
+) -> Transfer:
     # Where JAX computes in single precision its arrays are single, as those of the mesh become.
     dtype = jax.dtypes.canonicalize_dtype(coefficients.dtype)
     return Transfer(
         coefficients=jax.device_put(coefficients.astype(dtype, copy=False)),
         positions=jnp.asarray(mesh.vertices),
         normals=jnp.asarray(mesh.normals),
-        neighbors=geometry.neighbors(mesh),
+        neighbors=geometry.neighbors(mesh) if kept is None else kept.whole("neighbors"),
     )
