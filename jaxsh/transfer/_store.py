@@ -88,8 +88,8 @@ class BlockStore:
 
         It lies in memory of its own, or in what `room` gave.
         """
-        # In one go, to where JAX takes it without a copy: Zarr's own reading takes twice the time,
-        # and in a stream of blocks copies are nearly all that it takes.
+        # In one go, to where JAX takes it without a copy. Zarr's own reading copies more often, and
+        # copies are most of what a stream of blocks takes.
         from google_crc32c import value as crc32c
 
         array, file = self._array(name), self._file(name, block)

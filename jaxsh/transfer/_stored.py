@@ -186,7 +186,12 @@ class StoredTransfer:
 
 
 def open(path: str | os.PathLike[str]) -> StoredTransfer:
-    """Open the store that `bake` wrote, without reading the transfer itself.
+    """Open the store that `bake` or `bake_on` wrote, without reading the transfer itself.
+
+    It is a Zarr 3 group of the arrays `coefficients` (V, K), `positions`, `normals` and `neighbors`
+    of a `Transfer`, and `faces`, `unit_normals`, `origins` of rays and `albedo`, which bakes go on
+    from. Each is in chunks of the same number of rows, little-endian with a CRC-32C. Attributes
+    say the format, its version, the degree, the bake's arguments and the mesh's fingerprint.
 
     Raises `FileNotFoundError` where nothing is there, and `ValueError`, naming the path and the
     problem, for another thing, a newer version, and a bake that is not finished. Blocks whose bytes
