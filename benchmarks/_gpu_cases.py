@@ -41,7 +41,7 @@ FULL = Sizes(
     suns=100_000,
     exact_suns=1000,
     bake_vertices=50_000,
-    bake_directions=512,
+    bake_directions=2048,
     copied=2**28,
     side=8192,
 )
@@ -357,12 +357,15 @@ def _skies(fitted: int, exact: int) -> list[Case]:
 
 def _bake(vertices: int, directions: int) -> list[Case]:
     mesh = geometry.knot(vertices)
+    there = {"scene": geometry.JaxRayScene(mesh), "device": True}  # its tree is built by the host
     # The rays that leave a vertex are half of the directions, those above its horizon.
     rays = directions / 2 * len(mesh.vertices)
     return [
         Case(
             f"bake, degree 6, {directions} directions, {len(mesh.vertices)} vertices",
-            functools.partial(transfer.bake, mesh, 6, directions=directions, progress=False),
+            functools.partial(
+                transfer.bake, mesh, 6, directions=directions, progress=False, **there
+            ),
             (),
             items=rays,
             unit="rays",

@@ -183,10 +183,13 @@ def walk_in_lanes(
     first ones.
     """
     lanes = min(lanes, size)
+    beyond = size + jnp.arange(lanes, dtype=jnp.int32)
 
     def refill(state: _Lanes) -> _Lanes:
         idle = state.node == 0
-        found = state.found.at[jnp.where(idle, state.ray, size)].set(state.leaf, mode="drop")
+        # What is dropped has a place of its own beyond the end, so that no two write to one.
+        place = jnp.where(idle & (state.ray < size), state.ray, beyond)
+        found = state.found.at[place].set(state.leaf, mode="drop", unique_indices=True)
         turn = state.started + jnp.cumsum(idle, dtype=jnp.int32) - 1
         take = idle & (turn < count)
         new = turn if queue is None else _rows(queue, jnp.minimum(turn, size - 1))

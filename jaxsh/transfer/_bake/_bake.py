@@ -79,7 +79,7 @@ def bake(
       chunks of vertices, and the coefficients stay there; a `scene` must then be a
       `geometry.JaxRayScene`, on whose device it is done. `False` casts them on the host. By default
       they are cast on a GPU or TPU where that is the default device and `scene` allows it. The two
-      differ where rays graze an edge, by far less than two seeds do (experiment `device_bake`).
+      differ where rays graze an edge, by far less than two seeds do (experiment `devices.bake`).
     - `chunk`: vertices in a block, rounded up to a multiple of 64. Each core works on one block. On
       a device its size and `directions` decide.
     - `store`: a folder, made here, that keeps the blocks finished so far and in the end the whole
