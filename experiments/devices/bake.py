@@ -20,6 +20,8 @@ from ..runner import Context, Table, experiment
 class Config:
     meshes: tuple[str, ...] = ()
     """meshes by name, "knot" for the one made at run time; none means the first of the data"""
+    vertices: int = 20_000
+    """vertices of the knot"""
     degree: int = 6
     """degree of the transfer"""
     directions: int = 512
@@ -32,8 +34,11 @@ class Config:
     """bakes of each kind, of which the faster counts"""
 
     def __post_init__(self):
-        if min(self.directions, self.reference, self.rounds) < 1 or min(self.bounces) < 0:
-            raise ValueError("expected directions, reference and rounds >= 1, and bounces >= 0")
+        if (
+            min(self.vertices, self.directions, self.reference, self.rounds) < 1
+            or min(self.bounces) < 0
+        ):
+            raise ValueError("expected sizes and rounds of at least 1, and bounces of at least 0")
 
 
 class _Counting:
@@ -66,7 +71,7 @@ class _Took(NamedTuple):
 def bake(config: Config, context: Context) -> list[Table]:
     names = config.meshes or context.data.meshes()[:1]
     for name in context.progress(names, "meshes"):
-        mesh = geometry.knot() if name == "knot" else context.data.mesh(name)
+        mesh = geometry.knot(config.vertices) if name == "knot" else context.data.mesh(name)
         for bounces in config.bounces:
             context.record({"mesh": name} | _beside(mesh, bounces, config, context.seed))
     device = jax.devices()[0]
