@@ -125,6 +125,14 @@ def device_cache(maxsize: int):
     return decorate
 
 
+def rows_on_each(array, axis: int = 0) -> int:
+    """Counts the rows that one device has where a mesh shares them out."""
+    mesh = jax.typeof(array).sharding.mesh
+    manual = jax.sharding.AxisType.Manual in mesh.axis_types  # inside `shard_map` the others' left
+    devices = 1 if manual else math.prod(mesh.axis_sizes)
+    return -(-array.shape[axis] // devices)
+
+
 def rows_at_once(size: int) -> int:
     """Counts the rows of one call on an accelerator, where each takes `size` bytes."""
     return max(1, _ROOM // max(size, 1))

@@ -15,7 +15,7 @@ from numpy.polynomial import Polynomial
 from .._core.host import read_only_cache
 from .._core.linalg import matmul, shading_matmul, tensordot
 from .._core.vectors import normalize
-from .._core.xla import materialize, on_mesh, rows_at_once
+from .._core.xla import materialize, on_mesh, rows_at_once, rows_on_each
 from ..harmonics import degree_of, legendre, orders, phong
 from ..harmonics._tables import exact_grid
 from ._material import (
@@ -244,6 +244,8 @@ def lobe_products(
 
     # On one CPU the values of a pass stay in cache. Elsewhere a loop would leave devices idle: as
     # many passes as memory allows are one.
+    spread = on_mesh(axis, transfer, lobes)
+
     def in_passes(*parts):
         if len(parts[0]) == 1:
             return share(*(part[0] for part in parts))
@@ -252,9 +254,14 @@ def lobe_products(
         def add(total, part):
             return total + share(*part), None
 
-        return jax.lax.scan(add, jnp.zeros((len(lights), axis.shape[1]), axis.dtype), parts)[0]
+        if spread:  # what a loop starts from is shared out as all its sums are: the first of them
+            total = jax.checkpoint(share)(*(part[0] for part in parts))
+            parts = tuple(part[1:] for part in parts)
+        else:
+            total = jnp.zeros((len(lights), axis.shape[1]), axis.dtype)
+        return jax.lax.scan(add, total, parts)[0]
 
-    def together(number, directions, weights, passes):
+    def together(directions, weights, passes):
         rows = weights.reshape(-1, number, *weights.shape[1:])
         rows = jnp.moveaxis(rows, 1, 2).reshape(len(rows), len(lights), -1)
         directions, passes = (
@@ -264,13 +271,11 @@ def lobe_products(
 
     parts = directions, weights, transfer.node_passes(degree)
     count, size = nodes.directions.shape[:2]
-    if on_mesh(axis, parts, lobes):
-        return together(count, *parts)
-    most = rows_at_once(size * axis.shape[1] * axis.dtype.itemsize)
+    most = rows_at_once(size * rows_on_each(axis, 1) * axis.dtype.itemsize)
     number = max(n for n in range(1, count + 1) if count % n == 0 and n <= most)
-    return jax.lax.platform_dependent(
-        *parts, cpu=in_passes, default=functools.partial(together, number)
-    )
+    if spread:
+        return together(*parts)
+    return jax.lax.platform_dependent(*parts, cpu=in_passes, default=together)
 
 
 @jax.custom_jvp

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from sharding import ROWS, WHOLE, P, check_sharded
 
+from jaxsh._core import xla
 from jaxsh.sphere import Suns
 from jaxsh.transfer import (
     Material,
@@ -116,6 +117,25 @@ def test_glossy_shading(frame, rng):
     check_sharded(shade_glossy, sampled, (WHOLE, specs_of(sampled[1], SAMPLED), WHOLE, ROWS), ROWS)
     own = jnp.asarray(rng.normal(size=(V, 3, K)), np.float32)
     check_sharded(shade_glossy, (own, made, eye, material), (ROWS, ROWS, WHOLE, ROWS), ROWS)
+
+
+@pytest.mark.slow
+def test_glossy_shading_where_memory_is_short(rng, monkeypatch):
+    """Pass after pass on each device, in the room that its own vertices leave."""
+    normals = jnp.asarray(rng.normal(size=(1002, 3)), np.float32)
+    light = jnp.asarray(rng.normal(size=(3, 36)), np.float32)
+    material = Material(*(jnp.asarray(x, np.float32) for x in (0.5, 0.3, 8.0)))
+
+    def room(made):
+        arguments = light, made.sharded(jax.devices()[:2]), EYE, material
+        compiled = jax.jit(shade_glossy).lower(*arguments).compile()
+        return compiled.memory_analysis().temp_size_in_bytes
+
+    large = room(unshadowed(normals[:1000], normals[:1000], 5))
+    monkeypatch.setattr(xla, "_ROOM", 1)  # of another number of points, so that all is traced anew
+    made = unshadowed(normals, normals, 5)
+    check_sharded(shade_glossy, (light, made, EYE, material), (WHOLE, ROWS, WHOLE, WHOLE), ROWS)
+    assert room(made) < large / 2
 
 
 @pytest.mark.slow
