@@ -11,6 +11,7 @@ import functools
 import math
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -134,14 +135,8 @@ class BlockStore:
         """
         array = self._array(name)
         first = block * array.chunks[0]
-        try:
+        with _written(self._file(name, block)):
             array[first : first + len(values)] = values
-        except OSError as error:
-            said = (
-                f"{self._file(name, block)}: cannot be written: {reason(error)}; the blocks that "
-                "are finished are kept, and the same call goes on from them"
-            )
-            raise _like(error, said) from error
 
     def put(self, name: str, values: np.ndarray) -> None:
         """Write an array's blocks, those that are there and right already excepted."""
@@ -151,13 +146,15 @@ class BlockStore:
 
     def add(self, later: dict[str, tuple[tuple[int, ...], np.dtype]]) -> None:
         """Make room for those arrays, of shapes and dtypes, that are not there."""
-        for name, (shape, dtype) in later.items():
-            if name not in self._group:
-                _make_array(self._group, name, shape, dtype, self.block_rows)
+        with _written(self.path):
+            for name, (shape, dtype) in later.items():
+                if name not in self._group:
+                    _make_array(self._group, name, shape, dtype, self.block_rows)
 
     def record(self, **values: Any) -> None:
         """Add to the attributes."""
-        self._group.attrs.update(values)
+        with _written(self.path):
+            self._group.attrs.update(values)
         self.attributes |= values
 
     def drop(self, *names: str) -> None:
@@ -212,7 +209,8 @@ def make(
             store.put(name, array)
         temporary.replace(path)
     except OSError as error:
-        raise _like(error, f"{path}: cannot be written: {reason(error)}") from error
+        first = error.__cause__ if isinstance(error.__cause__, OSError) else error
+        raise _like(first, f"{path}: cannot be written: {reason(first)}") from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return BlockStore(path)
@@ -268,6 +266,19 @@ def _checked(path: Path, group: Any, name: str) -> Any:
     ):
         raise ValueError(f"{path}: {name} are not in the chunks that jaxsh writes")
     return array
+
+
+@contextlib.contextmanager
+def _written(path: Path) -> Iterator[None]:
+    """Say what could not be written."""
+    try:
+        yield
+    except OSError as error:
+        raise _like(
+            error,
+            f"{path}: cannot be written: {reason(error)}; the blocks that are finished are kept, "
+            "and the same call goes on from them",
+        ) from error
 
 
 def _like(error: OSError, said: str) -> OSError:

@@ -70,9 +70,11 @@ def test_blocks_damaged_in_the_end_are_baked_again(tmp_path, whole):
     assert BakeStore(path).missing(check=True) == [3, 10]
     np.testing.assert_array_equal(run(Scene(), path), whole[0])
     assert BakeStore(path).missing(check=True) == []
+    (path / "passes" / "0").mkdir(parents=True)  # as where the last step was stopped
     asked = Scene()
     np.testing.assert_array_equal(run(asked, path), whole[0])
     assert asked.asked <= 1  # where rays start
+    assert not (path / "passes").exists()
 
 
 def hurt(file, how):

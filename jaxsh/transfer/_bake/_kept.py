@@ -52,7 +52,9 @@ class BakeStore(BlockStore):
             store.put(name, array)
         if store.missing("neighbors", check=True):
             store.put("neighbors", np.asarray(geometry.neighbors(mesh)))
-        if not store.finished:
+        if store.finished:
+            store.drop(_PASSES)  # where it was stopped at that
+        else:
             store.add(later)
         return store
 
@@ -122,7 +124,7 @@ class BakeStore(BlockStore):
     def finish(self, warning: str) -> None:
         """Keep what the user is to be told, and let go of what only the bake needed."""
         self.record(warning=warning)
-        self.drop(*([_PASSES] if self.passes > 1 else []))
+        self.drop(_PASSES)
 
     def _pass(self, number: int) -> str:
         return _name(number, self.passes)
