@@ -13,8 +13,11 @@ V, DEGREE = 33, 2
 EYE = np.array([0.3, -2.0, 1.5])
 
 
-def compute(devices) -> dict[str, np.ndarray]:
-    """Shading, projections, a fit and gradients of points that the devices share, as a whole."""
+def compute(devices, store: str) -> dict[str, np.ndarray]:
+    """Shading, projections, a fit and gradients of points that the devices share, as a whole.
+
+    `store`: of a transfer of the degree; each process reads its own part.
+    """
     rng = np.random.default_rng(17)
     normals = np.asarray(sphere.fibonacci(V).directions)
     made = transfer.unshadowed(0.3 * normals, normals, DEGREE).sharded(devices)
@@ -31,6 +34,8 @@ def compute(devices) -> dict[str, np.ndarray]:
     project = jax.jit(lambda values, quadrature: sphere.project(values.T, quadrature, DEGREE))
     found = inverse.fit_light(colors, made, rows, 1, prior=None)
     skies = sky.fit(glow, {}, degree=1, terms=[4], samples=[9], solver="qr", devices=devices)
+    stored = transfer.open(store)
+    read = transfer.shade_diffuse(light, stored.sharded(devices), 0.5)
     results = {
         "diffuse": transfer.shade_diffuse(light, made, rows),
         "glossy": transfer.shade_glossy(light, made, EYE, material),
@@ -41,7 +46,8 @@ def compute(devices) -> dict[str, np.ndarray]:
         "slope in the light": slopes[0],
         "slope in the coefficients": slopes[1],
     }
-    return {name: _whole(array) for name, array in results.items()}
+    whole = {name: _whole(array)[:V] for name, array in results.items()}
+    return whole | {"diffuse, from a store": _whole(read)[: stored.num_points]}
 
 
 def glow(view, sun):
@@ -49,14 +55,14 @@ def glow(view, sun):
 
 
 def _whole(array: jax.Array) -> np.ndarray:
-    """All rows on each process, but for those that fill up."""
+    """All rows on each process."""
     if not array.is_fully_addressable and not array.is_fully_replicated:
         array = multihost_utils.process_allgather(array, tiled=True)
-    return np.asarray(array)[:V]
+    return np.asarray(array)
 
 
 if __name__ == "__main__":
-    address, number, path = sys.argv[1:]
+    address, number, store, path = sys.argv[1:]
     jax.distributed.initialize(address, num_processes=2, process_id=int(number))
     assert (jax.process_count(), jax.local_device_count()) == (2, 1)
-    np.savez(path, allow_pickle=False, **compute(None))
+    np.savez(path, allow_pickle=False, **compute(None, store))

@@ -15,9 +15,13 @@ import numpy as np
 import processes
 import pytest
 
+from jaxsh import geometry, transfer
+
 
 @pytest.mark.slow
 def test_two_processes_compute_what_one_does(tmp_path):
+    store = tmp_path / "knot.zarr"
+    transfer.bake(geometry.knot(300), 2, shadows=False, store=store, progress=False)
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{free.getsockname()[1]}"
@@ -31,7 +35,7 @@ def test_two_processes_compute_what_one_does(tmp_path):
     paths = [tmp_path / f"{number}.npz" for number in range(2)]
     children = [
         subprocess.Popen(
-            [sys.executable, processes.__file__, address, str(number), str(path)],
+            [sys.executable, processes.__file__, address, str(number), str(store), str(path)],
             env=os.environ | settings,
             stderr=subprocess.PIPE,
             text=True,
@@ -39,7 +43,7 @@ def test_two_processes_compute_what_one_does(tmp_path):
         for number, path in enumerate(paths)
     ]
     try:
-        expected = processes.compute(jax.devices()[:1])
+        expected = processes.compute(jax.devices()[:1], str(store))
         said = [child.communicate(timeout=120)[1] for child in children]
     finally:
         for child in children:
