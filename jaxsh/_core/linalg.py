@@ -79,12 +79,18 @@ def shading_tensordot(a: ArrayLike, b: ArrayLike) -> Array:
 def shading_tall_product(
     tall: Float[Array, "v k"], rows: Float[Array, "n k"]
 ) -> Float[Array, "v n"]:
-    """tall @ rowsᵀ of what is shown, with rows of zeros up to a multiple of eight.
+    """tall @ rowsᵀ of what is shown."""
 
-    XLA's CPU kernel is faster with these than with fewer rows.
-    """
-    filled = jnp.pad(rows, ((0, -len(rows) % 8), (0, 0)))
-    return shading_matmul(tall, filled.T)[:, : len(rows)]
+    def plain(tall, rows):
+        return shading_matmul(tall, rows.T)
+
+    # XLA's CPU kernel is faster with eight rows. A GPU would write all eight, and read them again.
+    def filled(tall, rows):
+        return plain(tall, jnp.pad(rows, ((0, 8 - len(rows)), (0, 0))))[:, : len(rows)]
+
+    if len(rows) >= 8:
+        return plain(tall, rows)
+    return jax.lax.platform_dependent(tall, rows, cpu=filled, default=plain)
 
 
 def _chosen(a: ArrayLike, b: ArrayLike) -> jax.lax.Precision | None:
