@@ -1,6 +1,7 @@
 """Bakes that are stopped go on where they were, and end the same."""
 
 import bodies
+import jax
 import numpy as np
 import pytest
 import zarr
@@ -147,6 +148,15 @@ def test_another_folder_is_refused_and_kept(tmp_path, content):
 def test_an_empty_folder_is_filled(tmp_path, whole):
     np.testing.assert_array_equal(run(Scene(), tmp_path), whole[0])
     assert not [path for path in tmp_path.parent.iterdir() if path.name.endswith(".partial")]
+
+
+def test_a_bake_goes_on_in_single_precision(tmp_path, whole):
+    path = tmp_path / "knot"
+    with pytest.raises(KeyboardInterrupt):
+        run(Scene(after=18), path)
+    with jax.enable_x64(False):
+        got = run(Scene(), path)
+    np.testing.assert_array_equal(got, whole[0])
 
 
 def test_a_store_changes_nothing(tmp_path):
