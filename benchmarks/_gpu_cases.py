@@ -256,10 +256,15 @@ def _samples(vertices: int) -> list[Case]:
 
 def _tiles(vertices: int, part: int) -> list[Case]:
     """Tiles of a part of the mesh, repeated: how they are chosen costs no time in a frame."""
-    made = _made(vertices)
-    first = transfer.Transfer(*(leaf[:part] for leaf in jax.tree.leaves(made)))
+    copies = max(1, vertices // part)
+    part = vertices // copies
+    whole = _made(vertices)
+    vertices = copies * part
+    first, made = (
+        transfer.Transfer(*(leaf[:count] for leaf in jax.tree.leaves(whole)))
+        for count in (part, vertices)
+    )
     small = adaptive.make_tiles(first, _EYE)
-    copies = vertices // part
     places = small.tiling.permutation.size
     which = np.arange(copies, dtype=np.int32)
 

@@ -53,14 +53,14 @@ def test_the_data_sheet_is_found_by_the_device():
 
 @pytest.mark.slow
 def test_tiles_are_repeated():
-    [case] = _gpu_cases._tiles(300, 100)
+    [case] = _gpu_cases._tiles(301, 80)  # 3 × 100
     tiles, light, eye, material = case.arguments
     glossy = transfer.Material(0.0, material.specular, material.exponent)
     parts = case.function(tiles, light, eye, glossy).reshape(3, 100, 3)
     assert (parts[1:] == parts[:1]).all()
     assert jnp.ptp(parts) > 0
     # The first third of the points by themselves.
-    points = sphere.fibonacci(300).directions[:100].astype(np.float32)
+    points = sphere.fibonacci(301).directions[:100].astype(np.float32)
     made = transfer.unshadowed(points, points, 10)
     alone = adaptive.make_tiles(made, eye)(light, eye, glossy).color
     np.testing.assert_allclose(parts[0], alone, rtol=0, atol=1e-6)
