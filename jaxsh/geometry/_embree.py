@@ -2,6 +2,7 @@
 
 import functools
 import math
+import threading
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -82,8 +83,8 @@ class EmbreeRayScene:
 
     A ray that starts on a surface may hit it: start it a little off, along the normal.
     Answers do not depend on the number of threads or on how rays are cut into chunks. With
-    `threads=1` they are cast on the thread that asks, as suits a program that asks from several;
-    Embree still builds its tree on all cores. Runs on the host, outside `jit`, and gives NumPy
+    `threads=1` they are cast on the thread that asks, as suits a program that asks from several.
+    The first query builds the tree, on all cores. Runs on the host, outside `jit`, and gives NumPy
     arrays. Not differentiable.
 
     Raises `ImportError` where embreex cannot be imported, and `ValueError` for no mesh.
@@ -116,8 +117,17 @@ class EmbreeRayScene:
         self._scene: Any = build_scene(robust=True)
         for part in zip(points, faces, strict=True):
             build_mesh(self._scene, *part)
-        # Embree builds its tree at the first query, and that must not happen on two threads.
-        self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+        self._built, self._building = False, threading.Lock()
+
+    def _build(self) -> None:
+        """Have Embree build its tree, which it does at the first query, on one thread.
+
+        Not with the scene: who needs the meshes no more may let go of them before.
+        """
+        with self._building:
+            if not self._built:
+                self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+                self._built = True
 
     @functools.cached_property
     def _pool(self) -> ThreadPoolExecutor:
@@ -175,6 +185,8 @@ class EmbreeRayScene:
         return hit
 
     def _each_chunk(self, count: int, run: Callable[[slice], None]) -> None:
+        if not self._built:
+            self._build()
         size = min(max(-(-count // self._threads), _CHUNK[0]), _CHUNK[1])
         parts = [slice(start, min(start + size, count)) for start in range(0, count, size)]
         if len(parts) == 1 or self._threads == 1:

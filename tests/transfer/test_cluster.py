@@ -46,6 +46,14 @@ def test_a_cluster_gives_the_bits_of_one_process(tmp_path, client):
     assert not client.who_has()
 
 
+@pytest.mark.slow
+def test_rays_may_be_cast_by_jax(tmp_path, client):
+    options = ALIKE | {"device": True}
+    expected = bake(MESH, DEGREE, **options)
+    bake_on(client, MESH, DEGREE, store=tmp_path / "knot", **options)
+    np.testing.assert_array_equal(rows(tmp_path / "knot"), expected.coefficients)
+
+
 def test_a_store_that_one_process_began_is_finished_on_a_cluster(tmp_path, client):
     """What is missing or damaged is baked again, and nothing else."""
     path = tmp_path / "knot"

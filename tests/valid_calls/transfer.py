@@ -68,6 +68,7 @@ def calls():
             albedo=0.5,
             ray_bias=1e-4,
             offset=None,
+            device=False,
             seed=0,
             chunk=16,
             finite="albedo ray_bias",

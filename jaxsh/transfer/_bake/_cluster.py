@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import ArrayLike, Float, Int
 
-from ..._core.checks import as_host_float, as_path, check_degree, check_size
+from ..._core.checks import as_host_float, as_path, check_degree, check_flag, check_size
 from ..._core.host import cores
 from ..._core.words import reason
-from ...geometry import Mesh, ray_scene
+from ...geometry import Mesh
 from .._stored import StoredTransfer, open
 from ._blind import why_blind
+from ._device import job_of, scene_for
 from ._faults import check_arguments, faults
-from ._job import BakeArguments, Job, Prepared
+from ._job import BakeArguments, Prepared
 from ._kept import BakeStore, refuse
 from ._origins import origins
 from ._passes import progress_bar
@@ -45,6 +46,7 @@ def bake_on(
     albedo: Float[ArrayLike, "*v"] = 0.5,
     ray_bias: float | None = None,
     offset: float | None = None,
+    device: bool = False,
     seed: int = 0,
     chunk: int = 256,
     progress: bool = True,
@@ -62,6 +64,7 @@ def bake_on(
     - `client`: a `distributed.Client`, the address of a scheduler, or None for workers of its own
       on this machine: one process with a thread a core.
     - `store`: a folder that this process and all workers see under one path.
+    - `device`: casts rays by JAX on each worker's default device, and not by Embree.
     - `chunk`: vertices at a time on each thread of a worker, rounded up to a multiple of 64.
     - `progress`: shows a bar when standard error is a terminal and the bake takes over a second.
     - all others: as for `bake`. There is no `scene`: the mesh alone stops rays.
@@ -104,21 +107,25 @@ def bake_on(
         ray_bias=None if ray_bias is None else float(ray_bias),
         offset=None if offset is None else float(offset),
         seed=seed,
+        device=check_flag("device", device) and bool(shadows),
     )
     identity = arguments.identity(mesh)
     refuse(path, identity)
     path.parent.mkdir(parents=True, exist_ok=True)  # or fails before all work
     normals = unit_normals(mesh)
     with _connected(client) as connected:
-        start = origins(mesh, normals, ray_scene(mesh), ray_bias, offset) if shadows else None
+        start = None
+        if shadows:
+            scene = scene_for(mesh, arguments.device)
+            start = origins(mesh, normals, scene, ray_bias, offset)
+            del scene  # the workers have theirs
 
         def why(blind: Int[np.ndarray, " n"]) -> list[str]:
             assert start is not None  # without shadows no vertex is blind
-            return why_blind(mesh, ray_scene(mesh), blind, normals, start)
+            return why_blind(mesh, scene_for(mesh, arguments.device), blind, normals, start)
 
         positions = np.asarray(mesh.vertices) if start is None else start.positions
-        # Without a scene: the workers have theirs.
-        job = Job(mesh, arguments, None, Prepared(normals, positions))
+        job = job_of(mesh, arguments, None, Prepared(normals, positions))
         kept = BakeStore.of(path, mesh, job, identity)
         if not kept.finished:
             blind = _fill(connected, kept, identity, chunk, progress)

@@ -47,7 +47,9 @@ def scene_for(mesh: Mesh, device: bool, threads: int | None = None) -> RayScene:
     return JaxRayScene(mesh) if device else ray_scene(mesh, threads=threads)
 
 
-def job_of(mesh: Mesh, arguments: BakeArguments, scene: RayScene | None, prepared: Prepared) -> Job:
+def job_of(
+    mesh: Mesh | None, arguments: BakeArguments, scene: RayScene | None, prepared: Prepared
+) -> Job:
     """Make the job that casts rays where the arguments say."""
     if arguments.device and isinstance(scene, JaxRayScene):
         return DeviceJob(mesh, arguments, scene, prepared)
@@ -62,7 +64,7 @@ class DeviceJob(Job):
     """
 
     def __init__(
-        self, mesh: Mesh, arguments: BakeArguments, scene: JaxRayScene, prepared: Prepared
+        self, mesh: Mesh | None, arguments: BakeArguments, scene: JaxRayScene, prepared: Prepared
     ):
         super().__init__(mesh, arguments, scene, prepared)
         self._scene = scene

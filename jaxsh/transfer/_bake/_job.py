@@ -64,7 +64,7 @@ class Job:
 
     def __init__(
         self,
-        mesh: Mesh,
+        mesh: Mesh | None,  # needed for bounces alone
         arguments: BakeArguments,
         scene: RayScene | None,
         prepared: Prepared,
@@ -79,6 +79,7 @@ class Job:
                     arguments.directions, arguments.degree, arguments.seed, self.dtype
                 )
             if arguments.bounces:
+                assert mesh is not None
                 self._vectors = turned_fibonacci(arguments.directions, arguments.seed, self.dtype)
                 self._surface = surface(mesh)
                 self._share = np.ravel(self.arguments.albedo).astype(self.dtype) / math.pi

@@ -69,11 +69,12 @@ class BakeStore(BlockStore):
         arguments = BakeArguments.restored(
             self.attributes["arguments"], albedo if len(albedo) > 1 else albedo.reshape(())
         )
-        mesh = self.mesh()
         if scene is None and arguments.shadows:
-            scene = scene_for(mesh, arguments.device, threads)
+            scene = scene_for(self.mesh(), arguments.device, threads)
+            # The tree is built while neither the mesh nor what follows is in memory.
+            scene.occluded(np.zeros(3), np.ones(3))
         prepared = Prepared(self.whole("unit_normals"), self.whole("origins"))
-        return job_of(mesh, arguments, scene, prepared)
+        return job_of(self.mesh() if arguments.bounces else None, arguments, scene, prepared)
 
     def mesh(self) -> Mesh:
         """Read the mesh."""

@@ -61,7 +61,8 @@ class _Held:
             before, direct = self._all_before(number), self.kept.read_pass(0, block)
         part = self.kept.rows(block)
         rows = np.empty((part.stop - part.start, self.job.width), self.job.dtype)
-        size = -(-chunk // TILE) * TILE
+        # A device has chunks of its own.
+        size = max(len(rows), 1) if self.job.arguments.device else -(-chunk // TILE) * TILE
         for start in range(0, len(rows), size):
             at = slice(start, min(start + size, len(rows)))
             whole = slice(part.start + at.start, part.start + at.stop)
