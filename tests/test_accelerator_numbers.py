@@ -19,6 +19,7 @@ ROWS = 2500  # more than a block on a CPU
 CALLS = [
     ("harmonics", "evaluate", 2**30),
     ("harmonics", "product", 2**23),
+    ("midrange", "interpolate", 2**21),
     ("transfer", "shade_glossy", 2**20),
     ("transfer", "shade_sun.glossy", 2**24),
 ]

@@ -8,12 +8,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from .._core.xla import on_mesh
+from .._core.xla import equal_blocks, on_mesh, rows_at_once
 
 # Vertices per pass on a CPU: what they need stays in cache.
 BLOCK = 1024
-# And per call of an accelerator, as far as its memory goes: 0.4 GB for 350 samples of each.
-_MOST = 262_144
+# Bytes of what a vertex takes on the way, at most: some 350 samples, or rows of the light's matrix.
+_SIZE = 4096
 # Shares of all vertices that an accelerator computes: the least that holds the active ones.
 _SHARES = (16, 4, 1)
 _ROW = 256
@@ -33,7 +33,8 @@ def everywhere(work: Work, count: int, *, whole: bool = False) -> Float[Array, "
     again = jax.checkpoint(work)
 
     def at_once(numbers):
-        return again(None) if count <= _MOST else _by_block(again, numbers, _MOST)
+        most = rows_at_once(_SIZE)
+        return again(None) if count <= most else _by_block(again, numbers, most)
 
     def by_block(numbers):
         return _by_block(again, numbers, BLOCK)
@@ -47,6 +48,7 @@ def _by_block(work: Work, numbers: Int[Array, " n"], size: int) -> Float[Array, 
     count = len(numbers)
     if count <= size:
         return work(numbers)
+    size = equal_blocks(count, size)
     done = jax.lax.map(work, _cut(numbers, size))
     return jnp.moveaxis(done, 0, 1).reshape(done.shape[1], -1)[:, :count]
 
@@ -88,7 +90,7 @@ def compacted(work: Work, active: Bool[Array, " v"]) -> Float[Array, "rows v"]:
 
     def by_share(numbers, place):
         def share(size, numbers):
-            done = _by_block(again, numbers[:size], _MOST)
+            done = _by_block(again, numbers[:size], rows_at_once(_SIZE))
             return jnp.pad(done, ((0, 0), (0, count - size)))
 
         sizes = sorted({-(-count // part) for part in _SHARES})

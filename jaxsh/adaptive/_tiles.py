@@ -10,7 +10,7 @@ from jaxtyping import Array, ArrayLike, Float, Int, Int8
 
 from .._core.checks import check_flag, check_size, check_type
 from .._core.linalg import matmul
-from .._core.xla import in_turn, materialize
+from .._core.xla import in_turn, materialize, rows_at_once
 from ..harmonics import degree_of, evaluate, phong, rotate
 from ..transfer import AbstractTransfer, Material, Transfer, shade_diffuse
 from ..transfer._glossy_kernels import (
@@ -38,8 +38,6 @@ from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling
 
 DIRECTIONS = 40
 EXPONENT = 32.0
-# Blocks that an accelerator arranges at once: 0.3 GB of coefficients of degree 10.
-_MOST = 4096
 
 
 class TileSet(eqx.Module):
@@ -245,11 +243,14 @@ def _arrange(transfer, tiling, directions, rows, quantized):
 
     def sampled(part):
         vertices, tile = part
-        coefficients = transfer.coefficients.at[vertices].get(mode="promise_in_bounds")
-        samples = matmul(rows[tile], coefficients.T)
+        some = transfer.coefficients.at[vertices].get(mode="promise_in_bounds")
+        samples = matmul(rows[tile], some.T)
         return in_steps(samples, 1) if quantized else (samples, jnp.ones_like(samples[:, 0]))
 
-    samples, scales = in_turn(sampled, (tiling.permutation, tiling.tile), most=_MOST)
+    coefficients = transfer.coefficients
+    size = tiling.permutation.shape[1] * coefficients.shape[1] * coefficients.itemsize
+    parts = tiling.permutation, tiling.tile
+    samples, scales = in_turn(sampled, parts, most=rows_at_once(size))
     basis = evaluate(directions, transfer.degree, axis=0)
     order = tiling.permutation.reshape(-1)
     positions, normals = rows_of(transfer.positions[order], transfer.normals[order])

@@ -13,7 +13,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import check_all, check_flag, check_type, is_concrete
 from .._core.linalg import einsum
-from .._core.xla import in_turn, on_mesh
+from .._core.xla import in_turn, on_mesh, rows_at_once
 from ..midrange import Polygon
 from ..transfer import Transfer
 from ._checks import check_data, check_end, check_solver
@@ -21,10 +21,6 @@ from ._rectangle import Rectangle, moved, rectangle_of
 from ._result import Recovered, Statistics
 from ._shading import irradiance
 from ._solve import confidence, everywhere, levenberg_marquardt
-
-# Vertices, each once for each light, that an accelerator takes at once; and of starts as many as
-# have so many slopes of coefficients, four numbers each: 4 GB.
-_MOST, _NUMBERS = 2**18, 2**28
 
 
 def fit_polygons(
@@ -190,7 +186,7 @@ def _recover(observed, transfer, albedo, weights, guesses, *, turn, tolerance, m
         tolerance=tolerance,
         max_steps=max_steps,
         normal=on_mesh(observed, transfer),
-        most=max(1, _NUMBERS // (transfer.coefficients.size * still.shape[1])),
+        most=rows_at_once(transfer.coefficients.nbytes * still.shape[1]),
     )
     value = decode(solved.parameters, jax.tree.map(lambda leaf: leaf[solved.start], guesses))
     squared = jnp.sum(solved.residual**2)
@@ -218,5 +214,5 @@ def _irradiance(lights: Rectangle, transfer: Transfer) -> Float[Array, "v 3"]:
         # One channel is enough: the color is a factor.
         return irradiance(Polygon(light.vertices, jnp.ones(3, transfer.dtype)), transfer)
 
-    most = max(1, _MOST // max(transfer.num_points, 1))
+    most = rows_at_once(transfer.coefficients.nbytes)
     return einsum("lv,lc->vc", in_turn(one, lights, most=most), lights.radiance)

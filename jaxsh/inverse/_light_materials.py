@@ -7,14 +7,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from .._core.linalg import einsum, matmul
-from .._core.xla import in_turn
+from .._core.xla import in_turn, rows_at_once
 from ._light_solve import Solution, compress_rows
 from ._solve import covariance, fixed_point, triangle
 
 # No color becomes darker than this part of the mean: its logarithm is what is iterated.
 _DARKEST = 1e-4
-# Pixels, each once for each material, that an accelerator takes at once.
-_MOST = 2**18
 
 
 class Colored(NamedTuple):
@@ -45,7 +43,9 @@ def solve_colored(
         return small.operator[0], small.target * small.scale
 
     numbers = jnp.arange(count, dtype=materials.dtype)
-    operators, targets = in_turn(of, numbers, most=max(1, _MOST // observed.shape[0]))
+    width = jax.eval_shape(make, rows).shape[1]
+    size = len(observed) * (width + 3) * dtype.itemsize
+    operators, targets = in_turn(of, numbers, most=rows_at_once(size))
     norm = jnp.linalg.norm(targets)
     scale = jnp.where(norm > 0, norm, 1)
     operators, targets = operators / scale, targets / scale

@@ -13,14 +13,12 @@ import lineax as lx
 from jaxtyping import Array, Float
 
 from .._core.linalg import einsum
-from .._core.xla import in_turn, on_mesh
+from .._core.xla import in_turn, on_mesh, rows_at_once
 from ._shading import Shading, compress
 from ._solve import covariance, triangle
 
 # Rows that are made small at once: more do not fit a cache, and 10⁶ at once not the memory.
 _BLOCK = 2**14
-# Blocks that an accelerator makes small at once: 0.4 GB for degree 10, by three channels.
-_MOST = 16
 # How often the scale of the prior follows the mean light: each time it changes tenfold less.
 _PASSES = 8
 # Levels of noise that are tried, evenly in their logarithm, then more finely around the best.
@@ -59,7 +57,9 @@ def compress_rows(observed, rows, albedo, weights, make) -> Shading:
         small = compress(seen, make(part), reflected if each else albedo, trust)
         return small.operator, small.target * small.scale
 
-    operators, targets = in_turn(one, blocks, most=_MOST)
+    width = jax.eval_shape(make, rows).shape[1]
+    size = (3 if each else 1) * _BLOCK * (width + 3) * observed.dtype.itemsize
+    operators, targets = in_turn(one, blocks, most=rows_at_once(size))
     norm = jnp.linalg.norm(targets)
     scale = jnp.where(norm > 0, norm, 1)
     width, channels = operators.shape[-1], operators.shape[1]

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .._core.xla import materialize, on_mesh, varying_as
+from .._core.xla import materialize, on_mesh, rows_at_once, varying_as
 from ..harmonics import degrees, evaluate
 from ..harmonics._tables import gradient_table
 from ._vectors import (
@@ -27,8 +27,6 @@ from ._vectors import (
     select,
 )
 
-# Pairs of an arc and a receiver that an accelerator takes at once: 1.5 GB at degree 10.
-_PAIRS = 262_144
 _Y0 = float(np.sqrt(1 / (4 * np.pi)))
 
 Rows = Float[Array, "*arcs 3 n"]
@@ -115,7 +113,7 @@ def coefficients(
 
     spans, triangles = materialize(_spans_and_triangles, arcs, apex)
     nothing = _nothing(arcs.start, 3, degree**2), _nothing(arcs.start)
-    flux, angle = _sum(add_arc, nothing, (spans, arcs.normal, triangles), active)
+    flux, angle = _sum(add_arc, nothing, (spans, arcs.normal, triangles), active, degree)
     return _from_flux(flux, angle, degree)
 
 
@@ -142,7 +140,7 @@ def _rate(arcs: Arcs, moves: Arcs, active: Array | None, degree: int):
         return total + _integrate_odd(_basis(nodes, degree), _times(weights, nodes, speed))
 
     nothing = _nothing(start, (degree + 1) ** 2)
-    return _sum(add_arc, nothing, (_spans(arcs), speed), active)
+    return _sum(add_arc, nothing, (_spans(arcs), speed), active, degree)
 
 
 def coefficients_with_gradient(
@@ -166,11 +164,16 @@ def coefficients_with_gradient(
     nothing = tuple(_nothing(arcs.start, *shape) for shape in shapes)
     spans, triangles = materialize(_spans_and_triangles, arcs, apex)
     each = spans, arcs.normal, arcs.near, triangles
-    flux, pull, angle = _sum(add_arc, nothing, each, active)
+    flux, pull, angle = _sum(add_arc, nothing, each, active, degree)
     return _from_flux(flux, angle, degree), -pull
 
 
-def _sum(add_arc, total, arcs, active: Bool[Array, " arcs"] | None):
+def pair_bytes(degree: int, dtype) -> int:
+    """Bytes of the basis at the nodes of one arc, seen by one receiver."""
+    return (degree + 2) * (degree + 1) ** 2 * jnp.dtype(dtype).itemsize
+
+
+def _sum(add_arc, total, arcs, active: Bool[Array, " arcs"] | None, degree: int):
     """Add up arcs: `add_arc(total, arc)` of zeros and one arc after the other.
 
     On the CPU those that no receiver has are left out. An accelerator takes as many at once as its
@@ -189,7 +192,8 @@ def _sum(add_arc, total, arcs, active: Bool[Array, " arcs"] | None):
 
     def together(total, arcs, _):
         count = len(jax.tree.leaves(arcs)[0])
-        size = min(count, max(1, _PAIRS // max(1, jax.tree.leaves(total)[0].shape[-1])))
+        like = jax.tree.leaves(total)[0]
+        size = min(count, rows_at_once(pair_bytes(degree, like.dtype) * like.shape[-1]))
 
         def add(sums, some):
             parts = jax.vmap(functools.partial(once, total))(some)

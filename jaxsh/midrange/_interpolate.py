@@ -12,7 +12,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import check_choice, check_type
 from .._core.linalg import matmul
-from .._core.xla import on_mesh, varying_as
+from .._core.xla import on_mesh, rows_at_once, varying_as
 from ._expansion import Expansion, check_positions, monomials, term_orders
 from ._weights import Weights
 
@@ -20,8 +20,6 @@ Rule = Literal["none", "half", "full"]
 
 # Terms at a time on one CPU: 32 · 3 columns are as fast as more, and compile sooner.
 _COLUMNS = 32
-# Factors of all positions at a time elsewhere, as far as memory goes: half a gigabyte.
-_FACTORS = 2**27
 
 
 def interpolate(
@@ -142,7 +140,7 @@ def by_samples(
         return _over_samples(add, jnp.zeros(positions.shape, terms.dtype), parts, _COLUMNS)
 
     def at_once(*parts):
-        most = max(_COLUMNS, _FACTORS // max(math.prod(positions.shape[:-1]), 1))
+        most = rows_at_once(math.prod(positions.shape[:-1]) * terms.dtype.itemsize)
         return finish(_over_samples(blend, light, parts, most))
 
     light = jnp.zeros((*positions.shape[:-1], math.prod(terms.shape[-3:-1])), terms.dtype)

@@ -20,15 +20,14 @@ from .._core.checks import (
     check_vectors,
     is_concrete,
 )
-from .._core.xla import in_blocks
+from .._core.xla import in_blocks, rows_at_once
+from ._arcs import pair_bytes
 from ._emitters import Polygon, is_convex, unit_normal
 from ._vectors import inverse_power
 from ._visible import Plan, Scene, seen
 
 # Receivers per block: the basis of an arc's nodes stays in cache.
 _BLOCK = 1024
-# And per call of an accelerator, as far as its memory goes.
-_MOST = 262_144
 # With more arcs than twice as many there are fewer receivers to a block, in proportion.
 _ARCS = 128
 
@@ -234,6 +233,5 @@ def _unit_lights(scene: Scene, points, normals, plan: Plan):
     arcs = loops * (length + plan.horizon) * (count + 1)
     arcs += loops * count * (most + (not plan.in_front)) * (count + 1 if count > 1 else 1)
     fewer = max(1, arcs // _ARCS)
-    return in_blocks(
-        block, points, normals, size=max(1, _BLOCK // fewer), most=max(1, _MOST // fewer)
-    )
+    most = rows_at_once(fewer * pair_bytes(plan.degree, points.dtype))
+    return in_blocks(block, points, normals, size=max(1, _BLOCK // fewer), most=most)

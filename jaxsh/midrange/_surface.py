@@ -24,15 +24,11 @@ from .._core.checks import (
     flatten_batch,
 )
 from .._core.linalg import matmul
-from .._core.xla import in_turn
+from .._core.xla import in_turn, rows_at_once
 from ..harmonics import evaluate, evaluate_with_gradient, num_coefficients
 from ..sphere import fibonacci
 from ._emitters import EmissiveMesh, Polygon, Sphere
 from ._surfaces import Emitter, spheres, triangles
-
-# Basis values of samples that an accelerator has at once: 0.3 GB, and in reverse mode of
-# the gradient nine times that.
-_MOST = 2**26
 
 
 class SurfaceSamples(eqx.Module):
@@ -155,9 +151,10 @@ def _at_points(project, samples, point, degree):
     point = point.astype(samples.points.dtype)
     if point.ndim == 1:
         return project(samples, point, degree)
-    most = max(1, _MOST // max(len(samples.areas) * num_coefficients(degree), 1))
+    slopes = 4 if project is _project_with_gradient else 1
+    size = slopes * len(samples.areas) * num_coefficients(degree) * point.dtype.itemsize
     each = functools.partial(project, samples, degree=degree)
-    rows = in_turn(each, flatten_batch(point), most=most)
+    rows = in_turn(each, flatten_batch(point), most=rows_at_once(size))
     return jax.tree.map(lambda a: a.reshape(*point.shape[:-1], *a.shape[1:]), rows)
 
 

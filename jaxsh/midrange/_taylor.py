@@ -19,7 +19,7 @@ from jaxtyping import Array, Float
 from .._core.checks import check_choice, check_degree, check_type, described
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
-from .._core.xla import in_turn, keep_batch
+from .._core.xla import in_turn, keep_batch, rows_at_once
 from ..harmonics import degrees, num_coefficients
 from ..harmonics._tables import gradient_table
 from ._cube import RadianceCube, inverse_distances
@@ -28,8 +28,8 @@ from ._expansion import Expansion
 from ._moments import moment_tables, moments
 
 _ORDERS = range(4)
-# Numbers of cubes' radiance that an accelerator takes at once; order 3 makes 13 of each.
-_MOST = 2**25
+# Columns that order 3 makes of each texel, more than any other.
+_COLUMNS = 40
 
 
 def taylor(cube: RadianceCube, degree: int, order: int) -> Expansion:
@@ -95,7 +95,8 @@ def each(function: Callable[..., Array], cube: RadianceCube, tables: Any, *, sta
         shape = leaves[0].shape[:batch]
         flat = [row.reshape(math.prod(shape), *row.shape[batch:]) for row in leaves[: len(rows)]]
         flat = jax.tree.unflatten(cubes, flat)
-        most = max(1, _MOST // math.prod(cube.radiance.shape[batch:]))
+        texels, width = cube.radiance.shape[batch], cube.radiance.dtype.itemsize
+        most = rows_at_once(_COLUMNS * texels * width)
         result = in_turn(lambda cube: function(cube, tables, *static), flat, most=most)
         return result.reshape(*shape, *result.shape[1:])
 

@@ -89,12 +89,14 @@ def calls():
         ),
         "polygon_harmonics, horizon": of(hidden(0, m.polygon_harmonics), points, points),
         "polygon_harmonics, blockers": of(
-            hidden(3, m.polygon_harmonics), points, points, trips=13, why=memory
+            hidden(3, m.polygon_harmonics), points, points, trips=18, why=memory
         ),
         "polygon_harmonics_with_gradient": of(
             lambda c, p: both(lamp(c), p, DEGREE), corners, points
         ),
-        "polygon_harmonics_with_gradient, blocker": of(hidden(1, both), points, points),
+        "polygon_harmonics_with_gradient, blocker": of(
+            hidden(1, both), points, points, trips=4, why=memory
+        ),
         "project_cube": of(lambda c: m.project_cube(c, DEGREE), cubes),
         "project_cube_with_gradient": of(lambda c: m.project_cube_with_gradient(c, DEGREE), cubes),
         "project_cube_with_gradient, edges": of(
