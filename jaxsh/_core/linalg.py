@@ -84,11 +84,13 @@ def shading_tall_product(
     def plain(tall, rows):
         return shading_matmul(tall, rows.T)
 
-    # XLA's CPU kernel is faster with eight rows. A GPU would write all eight, and read them again.
+    # XLA's CPU kernel is faster with whole eights of rows. A GPU would write them all, and read
+    # them again.
     def filled(tall, rows):
-        return plain(tall, jnp.pad(rows, ((0, 8 - len(rows)), (0, 0))))[:, : len(rows)]
+        return plain(tall, jnp.pad(rows, ((0, missing), (0, 0))))[:, : len(rows)]
 
-    if len(rows) >= 8:
+    missing = -len(rows) % 8
+    if not missing:
         return plain(tall, rows)
     return jax.lax.platform_dependent(tall, rows, cpu=filled, default=plain)
 
