@@ -2,8 +2,11 @@
 
 A chunk is one file of little-endian numbers and their CRC-32C, and holds all columns of a block of
 rows. So any reader of Zarr 3 reads the group, and a chunk that is missing, cut off or damaged is
-told from one that is right without any record of what has been written: several processes may
-write at once.
+told from one that is right.
+
+A chunk that is right in itself may still be that of another block or store. So its checksum is kept
+a second time: in a file of its own, as several processes may write at once, and among the
+attributes once an array is complete.
 """
 
 import contextlib
@@ -11,6 +14,8 @@ import functools
 import math
 import os
 import shutil
+import socket
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,13 +24,14 @@ import numpy as np
 
 from .._core.host import aligned
 from .._core.words import reason
+from ._store_layout import FORMAT, VERSION, checked, make_array, open_group
 
-FORMAT, VERSION = "jaxsh transfer store", 1
 # Rows of a block: about a hundredth of the mesh, so that little is lost when a bake is stopped, and
 # a power of two, so that it is whole tiles of the bake. With more a task of a cluster would take
 # too long, with fewer the opening of files would show.
 _PARTS, _FEWEST, _MOST = 128, 64, 32_768
 _SUM = 4  # bytes of a chunk's checksum
+_SUMS = "sums"  # attribute: 8 hexadecimal digits a block, by array; also a folder in an array's
 
 
 class DamagedError(ValueError):
@@ -45,7 +51,7 @@ class BlockStore:
         self.path = path
         self._arrays: dict[str, Any] = {}
         self._read_only = read_only
-        self._group, self.attributes = _opened(path, "r" if read_only else "r+")
+        self._group, self.attributes = open_group(path, "r" if read_only else "r+")
         coefficients = self._array("coefficients")
         self.num_points, self.width = coefficients.shape
         self.block_rows: int = coefficients.chunks[0]
@@ -85,7 +91,7 @@ class BlockStore:
         return aligned((_bytes(self._array(name)),), np.uint8)
 
     def read(self, name: str, block: int, room: np.ndarray | None = None) -> np.ndarray:
-        """Read one block, read-only; raises `DamagedError` where it is not right.
+        """Read one block, read-only; raises `DamagedError` where it is not right, or another.
 
         It lies in memory of its own, or in what `room` gave.
         """
@@ -103,10 +109,15 @@ class BlockStore:
                 whole = opened.readinto(data.data) == data.size and not opened.read(1)
         except FileNotFoundError:
             raise DamagedError(self._problem(file, "missing")) from None
+        except OSError as error:
+            problem = f"not readable ({reason(error)})"
+            raise DamagedError(self._problem(file, problem)) from error
         data.setflags(write=False)
         numbers, expected = data[:-_SUM], data[-_SUM:]
         if not whole or crc32c(numbers) != int.from_bytes(expected, "little"):
             raise DamagedError(self._problem(file, "damaged"))
+        if expected.tobytes() not in self._sums(name, block):
+            raise DamagedError(self._problem(file, "not what was written there"))
         stored = numbers.view(array.dtype.newbyteorder("<")).reshape(array.chunks)
         return stored[:rows].astype(array.dtype, copy=False)
 
@@ -133,29 +144,83 @@ class BlockStore:
 
         After a power cut a file may be there without its bytes, which its checksum tells.
         """
-        array = self._array(name)
-        first = block * array.chunks[0]
-        with _written(self._file(name, block)):
-            array[first : first + len(values)] = values
+        array, file, own = self._array(name), self._file(name, block), self._sum_file(name, block)
+        part = slice(block * array.chunks[0], block * array.chunks[0] + len(values))
+        with _written(file):
+            try:
+                array[part] = values
+            except FileNotFoundError:  # another process finished, and dropped what is half written
+                array[part] = values
+            _put_beside(own, _sum_of(file))
 
-    def put(self, name: str, values: np.ndarray) -> None:
-        """Write an array's blocks, those that are there and right already excepted."""
-        size = self._array(name).chunks[0]
-        for block in self.missing(name, check=True):
-            self.write(name, block, values[block * size : (block + 1) * size])
+    def put(self, **arrays: np.ndarray) -> None:
+        """Write complete arrays, but the blocks that are there and right already."""
+        mended = []
+        for name, values in arrays.items():
+            size, missing = self._array(name).chunks[0], self.missing(name, check=True)
+            for block in missing:
+                self.write(name, block, values[block * size : (block + 1) * size])
+            if missing:
+                mended.append(name)
+        if mended:
+            self.settle(*mended)
 
     def add(self, later: dict[str, tuple[tuple[int, ...], np.dtype]]) -> None:
-        """Make room for those arrays, of shapes and dtypes, that are not there."""
+        """Make room for those arrays, of shapes and dtypes, that are not there.
+
+        Raises `ValueError` where one is of another shape or dtype.
+        """
         with _written(self.path):
             for name, (shape, dtype) in later.items():
                 if name not in self._group:
-                    _make_array(self._group, name, shape, dtype, self.block_rows)
+                    make_array(self._group, name, shape, dtype, self.block_rows)
+        for name, expected in later.items():
+            array = self._array(name)
+            if (array.shape, array.dtype) != expected:
+                raise ValueError(
+                    f"{self.path}: damaged: {name} should be {expected[1]} of shape {expected[0]}, "
+                    f"and are {array.dtype} of shape {array.shape}"
+                )
 
-    def record(self, **values: Any) -> None:
-        """Add to the attributes."""
+    def check_rows(self, *names: str) -> None:
+        """Raise `ValueError` unless arrays have one row for each vertex, in the same blocks."""
+        for name in names:
+            array = self._array(name)
+            if (array.shape[0], array.chunks[0]) != (self.num_points, self.block_rows):
+                raise ValueError(
+                    f"{self.path}: damaged: {name} are {array.shape[0]} rows in blocks of "
+                    f"{array.chunks[0]}, coefficients {self.num_points} in blocks of "
+                    f"{self.block_rows}"
+                )
+
+    def settle(self, *names: str, **values: Any) -> None:
+        """Record the checksums of arrays that are complete, and other attributes.
+
+        Raises `DamagedError` where a block was lost since it was written.
+        """
+        _, self.attributes = open_group(self.path, "r")  # another process may have been here first
+        sums = dict(self.attributes.get(_SUMS, {}))
+        for name in names:
+            found = []
+            for block in range(_blocks(self._array(name))):
+                file = self._file(name, block)
+                try:
+                    found.append(_sum_of(file))
+                except OSError:
+                    raise DamagedError(self._problem(file, "missing")) from None
+                if found[-1] not in self._sums(name, block):
+                    raise DamagedError(self._problem(file, "not what was written there"))
+            sums[name] = b"".join(found).hex()
+        values[_SUMS] = sums
         with _written(self.path):
             self._group.attrs.update(values)
         self.attributes |= values
+        self.drop(*(f"{name}/{_SUMS}" for name in names))
+
+    def tidy(self, name: str) -> None:
+        """Finish what `settle` was stopped at."""
+        if (self.path / name / _SUMS).exists():
+            self.settle(name)
 
     def drop(self, *names: str) -> None:
         """Delete arrays or groups, and what writers that were killed have left behind."""
@@ -168,9 +233,19 @@ class BlockStore:
             with contextlib.suppress(OSError):
                 left.unlink()
 
+    def _sums(self, name: str, block: int) -> Iterator[bytes]:
+        """Give the checksums that a block may have: of the complete array, and written since."""
+        complete = self.attributes.get(_SUMS, {}).get(name, "")
+        yield bytes.fromhex(complete[2 * _SUM * block : 2 * _SUM * (block + 1)])
+        with contextlib.suppress(OSError):
+            yield self._sum_file(name, block).read_bytes()
+
+    def _sum_file(self, name: str, block: int) -> Path:
+        return self.path.joinpath(name, _SUMS, str(block))
+
     def _array(self, name: str) -> Any:
         if name not in self._arrays:
-            self._arrays[name] = _checked(self.path, self._group, name)
+            self._arrays[name] = checked(self.path, self._group, name)
         return self._arrays[name]
 
     def _file(self, name: str, block: int) -> Path:
@@ -187,85 +262,56 @@ def make(
     later: dict[str, tuple[tuple[int, ...], np.dtype]],
     rows: int,
     attributes: dict[str, Any],
-) -> BlockStore:
-    """Write a store, which is put in its place complete, and open it.
+) -> bool:
+    """Write a store, which is put in its place complete, unless another process was faster.
 
-    Of the arrays `later` only shapes and dtypes are known yet. Raises `OSError` where the store
-    cannot be written.
+    Of the arrays `later` only shapes and dtypes are known yet. Returns whether this is the store
+    that is there now. Raises `OSError` where it cannot be written.
     """
     import zarr
 
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    path = path.resolve()  # a link stays one
+    _sweep(path)
+    by = f"{socket.gethostname()}-{os.getpid()}-{uuid.uuid4().hex}"
+    temporary = path.with_name(f".{path.name}.{by}.partial")
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         group = zarr.create_group(temporary, overwrite=True)
         for name, array in arrays.items():
-            _make_array(group, name, array.shape, array.dtype, rows)
+            make_array(group, name, array.shape, array.dtype, rows)
         for name, (shape, dtype) in later.items():
-            _make_array(group, name, shape, dtype, rows)
+            make_array(group, name, shape, dtype, rows)
         group.attrs.update({"format": FORMAT, "version": VERSION} | attributes)
         store = BlockStore(temporary)
-        for name, array in arrays.items():
-            store.put(name, array)
-        temporary.replace(path)
+        store.put(**arrays)
+        try:
+            temporary.replace(path)
+        except OSError:
+            if not (path / "zarr.json").exists():
+                raise
+            return False
     except OSError as error:
         first = error.__cause__ if isinstance(error.__cause__, OSError) else error
         raise _like(first, f"{path}: cannot be written: {reason(first)}") from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-    return BlockStore(path)
+    return True
 
 
-def _make_array(group: Any, name: str, shape: tuple[int, ...], dtype: np.dtype, rows: int) -> None:
-    from zarr.codecs import BytesCodec, Crc32cCodec
-
-    group.create_array(
-        name,
-        shape=shape,
-        dtype=dtype,
-        chunks=_chunks(shape, rows),
-        serializer=BytesCodec(endian="little"),
-        compressors=[Crc32cCodec()],
-        filters=None,
-        # What other readers of Zarr see where a chunk is missing: never what a bake could give.
-        fill_value=float("nan") if dtype.kind == "f" else -1,
-    )
-
-
-def _chunks(shape: tuple[int, ...], rows: int) -> tuple[int, ...]:
-    return (rows, *(max(size, 1) for size in shape[1:]))
-
-
-def _opened(path: Path, mode: Any) -> tuple[Any, dict[str, Any]]:
-    """Open the group of a store; raises `ValueError` for another thing or version."""
-    import zarr
-
-    try:
-        group = zarr.open_group(path, mode=mode, zarr_format=3)
-        attributes = dict(group.attrs)
-    except Exception as error:  # damaged metadata may raise anything
-        raise ValueError(f"{path}: not a transfer store; it is left as it is") from error
-    if attributes.get("format") != FORMAT:
-        raise ValueError(f"{path}: not a transfer store; it is left as it is")
-    version = attributes.get("version")
-    if version != VERSION:
-        said = reason(str(version), 40)
-        raise ValueError(f"{path}: written as version {said}, but this jaxsh reads {VERSION}")
-    return group, attributes
-
-
-def _checked(path: Path, group: Any, name: str) -> Any:
-    """Find an array of a store; raises `ValueError` unless it is stored as `make` does."""
-    try:
-        array = group[name]
-        codecs = [type(codec).__name__ for codec in array.metadata.codecs]
-    except Exception as error:  # damaged metadata may raise anything
-        raise ValueError(f"{path}: damaged: it holds no {name}: {reason(error)}") from error
-    if codecs != ["BytesCodec", "Crc32cCodec"] or array.chunks != _chunks(
-        array.shape, array.chunks[0]
-    ):
-        raise ValueError(f"{path}: {name} are not in the chunks that jaxsh writes")
-    return array
+def _sweep(path: Path) -> None:
+    """Delete what processes of this machine that were killed in `make` have left beside a path."""
+    start = f".{path.name}.{socket.gethostname()}-"
+    if os.name != "posix" or not path.parent.is_dir():
+        return
+    for left in path.parent.iterdir():
+        if left.name.startswith(start) and left.name.endswith(".partial"):
+            pid = left.name[len(start) :].partition("-")[0]
+            try:
+                os.kill(int(pid), 0)  # asks whether it lives
+            except ProcessLookupError:
+                shutil.rmtree(left, ignore_errors=True)
+            except (OSError, ValueError):
+                pass
 
 
 @contextlib.contextmanager
@@ -279,6 +325,25 @@ def _written(path: Path) -> Iterator[None]:
             f"{path}: cannot be written: {reason(error)}; the blocks that are finished are kept, "
             "and the same call goes on from them",
         ) from error
+
+
+def _sum_of(file: Path) -> bytes:
+    """Read the checksum at the end of a chunk's file."""
+    with file.open("rb") as opened:
+        opened.seek(-_SUM, os.SEEK_END)
+        return opened.read()
+
+
+def _put_beside(file: Path, content: bytes) -> None:
+    """Write a small file into a folder that another process may delete at any time."""
+    for last in (False, True):
+        try:
+            file.parent.mkdir(exist_ok=True)
+            file.write_bytes(content)
+            return
+        except FileNotFoundError:
+            if last:
+                raise
 
 
 def _like(error: OSError, said: str) -> OSError:

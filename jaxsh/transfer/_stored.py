@@ -207,10 +207,11 @@ def open(path: str | os.PathLike[str]) -> StoredTransfer:
     ...     bool((transfer.open(path).load().coefficients == baked.coefficients).all())
     True
     """
-    path = as_path(path)
+    path = as_path(path).absolute()
     if not path.exists():
         raise FileNotFoundError(f"{path}: there is no such transfer store")
     store = BlockStore(path, read_only=True)
+    store.check_rows(*_ARRAYS)
     for name in _ARRAYS:
         if missing := store.missing(name):
             raise ValueError(

@@ -116,7 +116,7 @@ def bake(
     seed = check_size("seed", seed, least=0)
     if scene is not None:
         check_type("scene", scene, RayScene)
-    path = None if store is None else as_path(store, "store")
+    path = None if store is None else as_path(store, "store").absolute()
     check_arguments(mesh, directions, shadows, bounces, albedo, ray_bias, offset, chunk)
     on_device = takes_device(device, scene)
     arguments = BakeArguments(

@@ -44,16 +44,18 @@ class BakeStore(BlockStore):
         if not _stands(path):
             arrays["neighbors"] = np.asarray(geometry.neighbors(mesh))
             about = {"degree": job.arguments.degree, "arguments": identity}
-            make(path, arrays, later, block_rows(job.num_points), about)
-            return BakeStore(path)
+            if make(path, arrays, later, block_rows(job.num_points), about):
+                return BakeStore(path)
         refuse(path, identity)
         store = BakeStore(path)
-        for name, array in arrays.items():
-            store.put(name, array)
+        complete = {name: (array.shape, array.dtype) for name, array in arrays.items()}
+        store.add(complete | {"coefficients": later["coefficients"]})
+        store.put(**arrays)
         if store.missing("neighbors", check=True):
-            store.put("neighbors", np.asarray(geometry.neighbors(mesh)))
+            store.put(neighbors=np.asarray(geometry.neighbors(mesh)))
         if store.finished:
-            store.drop(_PASSES)  # where it was stopped at that
+            store.tidy("coefficients")  # where it was stopped at that
+            store.drop(_PASSES)
         else:
             store.add(later)
         return store
@@ -124,7 +126,7 @@ class BakeStore(BlockStore):
 
     def finish(self, warning: str) -> None:
         """Keep what the user is to be told, and let go of what only the bake needed."""
-        self.record(warning=warning)
+        self.settle("coefficients", warning=warning)
         self.drop(_PASSES)
 
     def _pass(self, number: int) -> str:
