@@ -271,7 +271,7 @@ def make(
     import zarr
 
     path = path.resolve()  # a link stays one
-    _sweep(path)
+    sweep(path)
     by = f"{socket.gethostname()}-{os.getpid()}-{uuid.uuid4().hex}"
     temporary = path.with_name(f".{path.name}.{by}.partial")
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -298,7 +298,7 @@ def make(
     return True
 
 
-def _sweep(path: Path) -> None:
+def sweep(path: Path) -> None:
     """Delete what processes of this machine that were killed in `make` have left beside a path."""
     start = f".{path.name}.{socket.gethostname()}-"
     if os.name != "posix" or not path.parent.is_dir():

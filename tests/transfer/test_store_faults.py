@@ -1,8 +1,10 @@
 """Bakes that the machine stops: killed, out of room, or with a store that was changed on disk."""
 
 import contextlib
+import os
 import resource
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +16,8 @@ import stopping
 
 from jaxsh.transfer import bake, shade_diffuse
 from jaxsh.transfer import open as open_store
+from jaxsh.transfer._bake import _kept
+from jaxsh.transfer._store import sweep
 
 OPTIONS = {"directions": 128, "bounces": 1, "progress": False}
 
@@ -124,6 +128,11 @@ def changed(path, file, change):
         ("zarr.json", lambda b: b.replace(b"jaxsh transfer store", b"a thesis"), "not a transfer"),
         ("zarr.json", lambda b: b.replace(b'"version": 1', b'"version": 2'), "as version 2, but"),
         ("coefficients/zarr.json", lambda b: b[:50], "damaged: it holds no coefficients"),
+        (
+            "coefficients/zarr.json",
+            lambda b: b.replace(b"700", b"650"),
+            "700 rows .* 650 in blocks",
+        ),
         ("normals/zarr.json", lambda b: b.replace(b"crc32c", b"gzip"), "holds no normals"),
         ("coefficients/c/3/0", lambda b: b[:-1], "1 of 11 blocks of coefficients are missing"),
         ("neighbors/c/0/0", lambda b: b + b" ", "1 of 11 blocks of neighbors are missing"),
@@ -148,6 +157,54 @@ def test_a_damaged_block_is_found_when_it_is_read(finished):
                 use()
     finally:
         (finished / file).write_bytes(before)
+
+
+@pytest.mark.parametrize("name", ["coefficients", "normals"])
+def test_a_block_of_another_place_is_found(finished, name):
+    """Though it is whole, and its checksum right."""
+    stored = open_store(finished)
+    expected, other = stored.load(), (finished / name / "c/4/0").read_bytes()
+    changed(finished, f"{name}/c/3/0", lambda content: other)
+    with pytest.raises(ValueError, match=rf"knot: {name}/c/3/0 is not what was written there"):
+        stored.load()
+    bake(stopping.MESH, 1, store=finished, shadows=False, progress=False)
+    np.testing.assert_array_equal(
+        getattr(open_store(finished).load(), name), getattr(expected, name)
+    )
+    assert not list(finished.rglob("sums"))
+
+
+def test_a_store_that_another_process_makes_meanwhile_is_gone_on_with(finished, monkeypatch):
+    before = {file: file.stat().st_mtime_ns for file in finished.glob("*/c/*/*")}
+    answers = iter([False, False])  # as it was when both looked
+    monkeypatch.setattr(_kept, "_stands", lambda path: next(answers, True))
+    bake(stopping.MESH, 1, store=finished, shadows=False, progress=False)
+    assert {file: file.stat().st_mtime_ns for file in finished.glob("*/c/*/*")} == before
+    answers = iter([False, False])
+    with pytest.raises(ValueError, match="the store of another bake: its seed is 0, and 1 here"):
+        bake(stopping.MESH, 1, store=finished, shadows=False, seed=1, progress=False)
+    assert [file.name for file in finished.parent.iterdir()] == ["knot"]
+
+
+def test_what_a_killed_process_began_is_deleted(tmp_path):
+    with subprocess.Popen(["true"]) as ended:
+        pass
+    for pid, stays in (ended.pid, False), (os.getpid(), True):
+        begun = tmp_path / f".knot.{socket.gethostname()}-{pid}-0.partial"
+        begun.mkdir()
+        sweep(tmp_path / "knot")
+        assert begun.exists() == stays
+
+
+def test_a_path_may_be_relative_or_a_link(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "link").symlink_to("target")
+    bake(stopping.MESH, 1, store="link", shadows=False, progress=False)
+    stored = open_store("link")
+    monkeypatch.chdir("/")
+    assert stored.load().coefficients.shape == (700, 4)
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "target").is_dir()
 
 
 def test_nothing_is_opened_where_nothing_is(tmp_path):

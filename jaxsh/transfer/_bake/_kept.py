@@ -11,7 +11,7 @@ from jaxtyping import Float
 from ... import geometry
 from ..._core.words import reason
 from ...geometry import Mesh, RayScene
-from .._store import BlockStore, DamagedError, block_rows, make
+from .._store import BlockStore, DamagedError, block_rows, make, sweep
 from ._device import job_of, scene_for
 from ._job import BakeArguments, Job, Prepared
 
@@ -127,6 +127,7 @@ class BakeStore(BlockStore):
     def finish(self, warning: str) -> None:
         """Keep what the user is to be told, and let go of what only the bake needed."""
         self.settle("coefficients", warning=warning)
+        sweep(self.path)
         self.drop(_PASSES)
 
     def _pass(self, number: int) -> str:
