@@ -36,8 +36,8 @@ class JaxRayScene:
     On a CPU slower than Embree, which is made for it. The first query compiles, once for each
     power of two of the number of faces; no number of rays compiles anew on a CPU, and five sizes of
     chunks do on an accelerator. Memory is bounded, for rays pass in chunks. `tree` is what `trace`
-    takes, for rays cast inside `jit`, and `lanes` how many suit the device that it is on: the
-    default one when the scene was made, where the methods cast too. These run outside `jit` and
+    takes, for rays cast inside `jit`, and `lanes` how many suit the `device` that it is on:
+    the default one when the scene was made, where the methods cast too. These run outside `jit` and
     give NumPy arrays. Not differentiable.
 
     Raises `ValueError` for no mesh, and for meshes without a face of finite corners.

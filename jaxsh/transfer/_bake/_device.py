@@ -1,5 +1,6 @@
 """A bake whose rays are cast on JAX's default device, chunk after chunk, without a wait between."""
 
+import contextlib
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -71,8 +72,8 @@ class DeviceJob(Job):
         wanted = max(scene.lanes * _RAYS // arguments.directions, 1)
         whole = 1 << (self.num_points - 1).bit_length()
         self.chunk = max(min(1 << wanted.bit_length() - 1, whole), TILE)
-        with jax.enable_x64(True):
-            self._direct = jax.device_put(lights(self._lights), scene.device)
+        with self._there():
+            self._direct = lights(self._lights)
         self._lock = threading.Lock()
         self._reflecting: tuple[Any, Reflectors] | None = None
 
@@ -84,7 +85,7 @@ class DeviceJob(Job):
         direct: Float[np.ndarray, "rows k"] | None = None,
     ) -> Float[np.ndarray, "rows k"]:
         """Compute what `Job.rows` does, and wait for it."""
-        with jax.enable_x64(True):
+        with self._there():
             result = np.concatenate(
                 [np.asarray(each) for each in self._chunks(number, rows, before)]
             )
@@ -101,7 +102,7 @@ class DeviceJob(Job):
     ) -> Float[Array, "v k"]:
         """Compute what `Job.rows` does of all vertices; it stays on the device."""
         blocks = []
-        with jax.enable_x64(True):
+        with self._there():
             for values in self._chunks(number, slice(0, self.num_points), before):
                 blocks.append(values)
                 if len(blocks) >= UNDER_WAY:
@@ -111,6 +112,12 @@ class DeviceJob(Job):
             if direct is not None:
                 result += direct
         return result
+
+    @contextlib.contextmanager
+    def _there(self) -> Iterator[None]:
+        """Compute on the scene's device, without tying the results to it, whatever the session."""
+        with jax.enable_x64(True), jax.default_device(self._scene.device):
+            yield
 
     def _chunks(self, number: int, rows: slice, before: Any) -> Iterator[Float[Array, "m k"]]:
         """Start the programs of the chunks that hold some rows, and give the rows of each."""
@@ -124,7 +131,7 @@ class DeviceJob(Job):
             # them stay as they are, for rays from there hit nothing but by chance.
             origins[at : at + count] = scene.frame.into(start.origins[part])
             normals[at : at + count] = start.normals[part]
-            given = scene.tree, *jax.device_put((origins, normals), scene.device), light
+            given = scene.tree, jnp.asarray(origins), jnp.asarray(normals), light
             if number == 0:
                 values = shadowed_rows(*given, degree=self.arguments.degree, lanes=scene.lanes)
             else:
@@ -136,9 +143,6 @@ class DeviceJob(Job):
         """Put what leaves the vertices after a pass on the device, once for all its rows."""
         with self._lock:
             if self._reflecting is None or self._reflecting[0] is not before:
-                device = self._scene.device
-                share = self._share.reshape(-1, 1)
-                outgoing = jax.device_put(share, device) * jax.device_put(before, device)
-                made = reflectors(self._vectors, self._surface, outgoing)
-                self._reflecting = before, jax.device_put(made, device)
+                outgoing = jnp.asarray(self._share.reshape(-1, 1)) * jnp.asarray(before)
+                self._reflecting = before, reflectors(self._vectors, self._surface, outgoing)
             return self._reflecting[1]
