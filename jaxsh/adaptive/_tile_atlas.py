@@ -1,5 +1,7 @@
 """Tile sets for a camera that moves: split beforehand for many views, the nearest taken."""
 
+from collections.abc import Iterator
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -10,10 +12,14 @@ from .._core.checks import check_number, check_size, check_type
 from ..sphere import fibonacci
 from ..transfer import AbstractTransfer, Transfer, quantize
 from ..transfer._glossy_kernels import checked_eye
-from ._local_rule import check_rule
+from ._local_rule import check_rule, local_rule
 from ._method import check_known
-from ._tiles import DIRECTIONS, EXPONENT, TileSet, arrange
+from ._tile_samples import places
+from ._tiles import DIRECTIONS, EXPONENT, TileSet, arrange, arranged_in_slices
 from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling, vertex_areas
+
+# Slices of a set on an accelerator: at 50,000 vertices and degree 10 one is some 3,000 vertices.
+_SLICES = 16
 
 
 class TileAtlas(eqx.Module):
@@ -128,11 +134,13 @@ def make_tile_atlas(
 class TileFollower:
     """Follows an eye with the sets of an atlas, without waiting until the next one is ready.
 
-    The set of the nearest view is arranged in the background while frames go on with the one
-    before, whose accuracy falls off slowly with the angle between the views. Frames meanwhile
-    share the machine with that and are slower, and starting it takes a moment of its own. The
-    `keep` sets last used are kept, for an eye that comes back; where the eye will go is known,
-    `prepare` spares the frames all of it.
+    The set of the nearest view is arranged while frames go on with the one before, whose accuracy
+    falls off slowly with the angle between the views: in `slices`, one in each call, so that no
+    frame waits for more than one of them. By default that is all in one on a CPU, whose other
+    threads do it in the background, and 16 on an accelerator, which does one thing after the
+    other. Frames meanwhile share the machine with that and are slower, and starting it takes a
+    moment of its own. The `keep` sets last used are kept, for an eye that comes back; where the
+    eye will go is known, `prepare` spares the frames all of it.
 
     **Example**
 
@@ -148,13 +156,26 @@ class TileFollower:
     """
 
     def __init__(
-        self, atlas: TileAtlas, transfer: Transfer, eye: Float[ArrayLike, " 3"], *, keep: int = 4
+        self,
+        atlas: TileAtlas,
+        transfer: Transfer,
+        eye: Float[ArrayLike, " 3"],
+        *,
+        keep: int = 4,
+        slices: int | None = None,
     ):
         check_type("atlas", atlas, TileAtlas)
         check_type("transfer", transfer, Transfer)
         if check_size("keep", keep) < 2:
             raise ValueError(f"expected keep of at least 2, this set and the next, got {keep}")
+        check_known("TileFollower", atlas, transfer)
+        if slices is None:
+            devices = transfer.coefficients.devices()
+            slices = 1 if all(device.platform == "cpu" for device in devices) else _SLICES
+        self._slices = check_size("slices", slices)
         self._atlas, self._transfer, self._keep = atlas, transfer, keep
+        self._permutation = np.asarray(atlas.permutation)  # once, since it waits for the device
+        self._begun: tuple[int, Iterator[TileSet | None]] | None = None
         self._diffuse = quantize(transfer)  # which all sets share
         self._sets: dict[int, TileSet] = {}  # the one last used at the end
         self._view = atlas.view(eye)
@@ -163,8 +184,13 @@ class TileFollower:
     def __call__(self, eye: Float[ArrayLike, " 3"]) -> TileSet:
         """Return the set of the nearest view, or the one before until that is ready."""
         view = self._atlas.view(eye)
-        if all(map(_is_ready, self._sets.values())):  # one at a time is under way
-            self._use(view)
+        if self._begun is not None:
+            self._go_on(*self._begun)
+        elif all(map(_is_ready, self._sets.values())):  # one at a time is under way
+            if view in self._sets or self._slices == 1:
+                self._use(view)
+            else:
+                self._go_on(view, self._in_slices(view))
         if view in self._sets and _is_ready(self._sets[view]):
             self._view = view
         return self._sets[self._view]
@@ -177,8 +203,22 @@ class TileFollower:
             jax.block_until_ready(self._use(view))
         return len(views)
 
-    def _use(self, view: int) -> TileSet:
-        found = self._sets.pop(view, None)
+    def _in_slices(self, view: int) -> Iterator[TileSet | None]:
+        atlas, made = self._atlas, self._transfer
+        place = places(self._permutation[view], made.num_points)
+        rule = local_rule(made.degree, atlas.directions, atlas.exponent)
+        return arranged_in_slices(
+            made, atlas.tiling(view), place, rule, self._diffuse, self._slices
+        )
+
+    def _go_on(self, view: int, slices: Iterator[TileSet | None]) -> None:
+        done = next(slices)
+        self._begun = (view, slices) if done is None else None
+        if done is not None:
+            self._use(view, done)
+
+    def _use(self, view: int, made: TileSet | None = None) -> TileSet:
+        found = self._sets.pop(view, made)
         self._sets[view] = found or self._atlas.arranged(
             self._transfer, view, diffuse=self._diffuse
         )

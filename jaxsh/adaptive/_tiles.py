@@ -1,6 +1,7 @@
 """Glossy shading with a few quadrature directions around each tile's mirrored direction."""
 
 import functools
+from collections.abc import Iterator
 
 import equinox as eqx
 import jax
@@ -10,19 +11,17 @@ from jaxtyping import Array, ArrayLike, Float, Int, Int8
 
 from .._core.checks import check_flag, check_size, check_type
 from .._core.linalg import matmul
-from .._core.xla import in_turn, materialize, rows_at_once
-from ..harmonics import degree_of, evaluate, phong, rotate
+from .._core.xla import equal_blocks, materialize
+from ..harmonics import degree_of, phong
 from ..transfer import AbstractTransfer, Material, Transfer, shade_diffuse
 from ..transfer._glossy_kernels import (
     block_sums,
     checked_eye,
     checked_material,
     checked_one_light,
-    in_steps,
     mirrored,
-    rows_of,
 )
-from ._local_rule import check_rule, local_rule
+from ._local_rule import LocalRule, check_rule, local_rule
 from ._method import (
     AbstractMethod,
     check_known,
@@ -34,6 +33,7 @@ from ._method import (
 )
 from ._result import AdaptiveResult, full_cost, product_cost, sum_cost
 from ._staged import diffuse_part
+from ._tile_samples import arrange_all, outlined, places, slice_of
 from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling
 
 DIRECTIONS = 40
@@ -207,19 +207,38 @@ def arrange(
     quantized = check_flag("quantized", quantized)
     check_one_device("arrange", transfer)
     check_known("arrange", transfer, tiling)
-    permutation, vertices = np.asarray(tiling.permutation), transfer.num_points
-    place = np.full(max(vertices, permutation.max() + 1), -1, np.int32)
-    place[permutation.ravel()] = np.arange(permutation.size, dtype=np.int32)
-    if len(place) != vertices or place.min() < 0:
-        held = np.count_nonzero(place >= 0)
-        raise ValueError(f"expected a tiling of {vertices} vertices, got one of {held}")
-    dtype = transfer.positions.dtype
+    place = places(np.asarray(tiling.permutation), transfer.num_points)
     rule = local_rule(transfer.degree, directions, float(exponent))
-    rule = tuple(jnp.asarray(part, dtype) for part in rule)
+    rule = tuple(jnp.asarray(part, transfer.positions.dtype) for part in rule)
     diffuse = diffuse_part(transfer, diffuse, quantized)
-    samples, scales, at, basis, positions, normals = _arrange(
-        transfer, tiling, rule[0], rule[1], quantized
-    )
+    arranged = arrange_all(transfer, tiling, rule[0], rule[1], quantized)
+    return _tile_set(tiling, place, rule, diffuse, arranged)
+
+
+def arranged_in_slices(
+    transfer: Transfer, tiling: Tiling, place, rule: LocalRule, diffuse: AbstractTransfer, slices
+) -> Iterator[TileSet | None]:
+    """Does what `arrange` does, in eight bits, in so many slices; yields None, and the set last.
+
+    Looks at no values, so that it waits for nothing that is under way on the device.
+    """
+    rule = tuple(jnp.asarray(part, transfer.positions.dtype) for part in rule)
+    rows, *outline = outlined(transfer, tiling, rule[0], rule[1])
+    blocks = len(tiling.tile)
+    size, done = equal_blocks(blocks, -(-blocks // slices)), []
+    for start in range(0, blocks, size):
+        # The last slice begins early, so that all have one shape and take one program.
+        first = min(start, blocks - size)
+        part = slice_of(transfer.coefficients, tiling, rows, np.int32(first), size)
+        done.append(tuple(array[start - first :] for array in part))
+        if start + size < blocks:
+            yield None
+    samples, scales = (jnp.concatenate(parts) for parts in zip(*done, strict=True))
+    yield _tile_set(tiling, place, rule, diffuse, (samples, scales, *outline))
+
+
+def _tile_set(tiling, place, rule, diffuse, arranged) -> TileSet:
+    samples, scales, at, basis, positions, normals = arranged
     return TileSet(
         tiling,
         place=jnp.asarray(place),
@@ -233,41 +252,6 @@ def arrange(
         normals=normals,
         diffuse=diffuse,
     )
-
-
-@functools.partial(jax.jit, static_argnames="quantized")
-def _arrange(transfer, tiling, directions, rows, quantized):
-    turns = _turns(tiling.axes)
-    directions = matmul(directions[None], jnp.swapaxes(turns, 1, 2))
-    rows = rotate(rows, turns[:, None])
-
-    def sampled(part):
-        vertices, tile = part
-        some = transfer.coefficients.at[vertices].get(mode="promise_in_bounds")
-        samples = matmul(rows[tile], some.T)
-        return in_steps(samples, 1) if quantized else (samples, jnp.ones_like(samples[:, 0]))
-
-    coefficients = transfer.coefficients
-    size = tiling.permutation.shape[1] * coefficients.shape[1] * coefficients.itemsize
-    parts = tiling.permutation, tiling.tile
-    samples, scales = in_turn(sampled, parts, most=rows_at_once(size))
-    basis = evaluate(directions, transfer.degree, axis=0)
-    order = tiling.permutation.reshape(-1)
-    positions, normals = rows_of(transfer.positions[order], transfer.normals[order])
-    return samples, scales, directions, basis, positions, normals
-
-
-def _turns(axes: Float[Array, "tiles 3"]) -> Float[Array, "tiles 3 3"]:
-    """Builds rotations that take +z to each axis.
-
-    Duff et al. 2017, "Building an orthonormal basis, revisited".
-    """
-    x, y, z = axes.T
-    sign = jnp.where(z < 0, -1.0, 1.0).astype(axes.dtype)
-    a = -1 / (sign + z)
-    b = x * y * a
-    first = jnp.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=-1)
-    return jnp.stack([first, jnp.stack([b, sign + y * y * a, -y], axis=-1), axes], axis=-1)
 
 
 class Tiles(AbstractMethod):

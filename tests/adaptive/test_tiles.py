@@ -294,6 +294,20 @@ def test_follower_arrives_at_the_nearest_view(ball):
     assert len(follow._sets) <= 4
 
 
+def test_follower_in_slices_arranges_one_a_call(ball, light):
+    atlas = make_tile_atlas(ball, views=2, num_tiles=4, block=32)
+    follow = TileFollower(atlas, ball, atlas.eyes[0], slices=4)  # 10 blocks: 3, 3, 3 and the last
+    views = []
+    for _ in range(5):
+        views.append(follow(atlas.eyes[1]))
+        jax.block_until_ready(follow._sets)
+    moved = [bool((v.tiling.permutation == atlas.permutation[1]).all()) for v in views]
+    assert moved == [False, False, False, True, True]
+    whole = atlas.arranged(ball, 1)
+    for one, other in zip(jax.tree.leaves(views[-1]), jax.tree.leaves(whole), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-14, atol=1e-14)
+
+
 def test_follower_has_at_once_what_was_prepared_or_kept(ball):
     atlas = make_tile_atlas(ball, views=6, num_tiles=4, block=32)
     follow = TileFollower(atlas, ball, atlas.eyes[0], keep=2)

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from jaxsh import adaptive
-from jaxsh.adaptive import _tiles
+from jaxsh.adaptive import _tile_samples
 
 from .shared import DEGREE, K, V, baked, floats, integers, made_by, material, of
 
@@ -40,7 +40,7 @@ def anchor_set(made):
 
 
 def arranged(made, tiling, directions, rows):
-    return _tiles._arrange(made, tiling, directions, rows, True)
+    return _tile_samples.arrange_all(made, tiling, directions, rows, True)
 
 
 def tile_set(made, tiling, directions, rows):

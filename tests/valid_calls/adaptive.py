@@ -51,7 +51,14 @@ def calls():
         "Levels": of(a.Levels, **shared, diffuse_threshold=0.1),
         "Masks": of(a.Masks, **shared, diffuse_threshold=0.1),
         "TileFollower": of(
-            a.TileFollower, atlas=atlas, transfer=made, eye=eye(), keep=3, finite="eye", slow=True
+            a.TileFollower,
+            atlas=atlas,
+            transfer=made,
+            eye=eye(),
+            keep=3,
+            slices=2,
+            finite="eye",
+            slow=True,
         ),
         "TileAtlas.nearest": of(
             atlas.nearest, transfer=made, eye=eye(), diffuse=None, finite="eye", slow=True
