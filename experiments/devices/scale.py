@@ -178,9 +178,9 @@ def _large(config: Config, context: Context, folder: Path, rays: float) -> dict[
     )
     return {
         "bytes": size / count,
-        "tree": (run.worker - small.worker) / count,
-        "client": (run.client - small.client) / count,
-        "serial": (run.serial - small.serial) / count,
+        "tree": max(run.worker - small.worker, 0.0) / count,
+        "client": max(run.client - small.client, 0.0) / count,
+        "serial": max(run.serial - small.serial, 0.0) / count,
     }
 
 
