@@ -7,8 +7,10 @@ import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
 from .._core.checks import check_choice, check_degree, check_flag, check_size, check_type
+from .._core.xla import on_mesh
 from ..harmonics import degree_of
 from ..transfer import AbstractTransfer, Material
+from ._by_device import filtered_by_device
 from ._filter import Filter, filtered
 from ._method import (
     AbstractMethod,
@@ -149,7 +151,8 @@ class Levels(AbstractFilter):
     Each level gathers the vertices that are left into blocks. Their number may change from frame
     to frame without another compilation. The diffuse part is decided on, but computed for all,
     which costs less than to gather. Options, result and errors are those of `Masks`, with which it
-    agrees to rounding; it refuses arrays on several devices, since it gathers.
+    agrees to rounding. Where several devices share the vertices, each gathers its own; shares and
+    cost are means over them.
 
     It pays against an einsum of light product, transfer and lobe; not against the same product in
     tiles of vertices, nor against `transfer.shade_glossy` of a sampled transfer. Experiment
@@ -175,7 +178,8 @@ class Levels(AbstractFilter):
         eye: Float[ArrayLike, " 3"],
         material: Material,
     ) -> AdaptiveResult:
-        check_one_device("Levels", transfer)
+        if self.rings or self.smoothing:
+            check_one_device("Levels with rings or smoothing", transfer)
         return _filtered(self, "levels", light, transfer, eye, material, compact=True)
 
 
@@ -184,4 +188,6 @@ def _filtered(method, name, light, transfer, eye, material, compact):
     light, eye, material = checked_frame(light, plain, eye, material)
     settings = method.settings(light, method.diffuse_threshold)
     previous = method.remembered(plain.num_points)
+    if compact and on_mesh(plain):
+        return filtered_by_device(light, plain, eye, material, settings, previous)
     return filtered(light, plain, eye, material, settings, previous, compact=compact)

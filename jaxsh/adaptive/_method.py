@@ -108,8 +108,8 @@ def check_one_device(name: str, *trees) -> None:
     if on_mesh(*trees):
         raise ValueError(
             f"{name} gathers vertices from all over the mesh, which would move them between "
-            "devices: expected arrays on one device; with several, take Masks() without rings and "
-            "smoothing, or transfer.shade_glossy"
+            "devices: expected arrays on one device; with several, take Masks() or Levels() "
+            "without rings and smoothing, or transfer.shade_glossy"
         )
 
 

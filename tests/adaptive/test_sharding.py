@@ -12,7 +12,7 @@ from jaxsh.transfer import Material, Transfer
 
 V, DEGREE, K = 16, 3, 16
 METHODS = [
-    adaptive.Levels(),
+    adaptive.Levels(rings=1),
     adaptive.TwoStage(),
     adaptive.Anchors(),
     adaptive.Tiles(),
@@ -42,6 +42,35 @@ def test_masks_keep_the_sharding_of_vertices(frame):
     for shown in adaptive.shade(*frame, method).shown_degree.values():
         assert set(np.asarray(shown).tolist()) == {2, DEGREE}  # some have left
     check_sharded(color, frame, (WHOLE, ROWS, WHOLE, ROWS), ROWS)
+
+
+def test_levels_are_gathered_by_each_device(frame):
+    method = adaptive.Levels(threshold=0.02, diffuse_threshold=0.03, fallback="base")
+
+    def shown(light, made, eye, material):
+        result = adaptive.shade(light, made, eye, material, method)
+        again = adaptive.Levels(hysteresis=0.5, previous=result)
+        return result.color, adaptive.shade(light, made, eye, material, again).color
+
+    check_sharded(shown, frame, (WHOLE, ROWS, WHOLE, ROWS), ROWS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["Auto", "Explicit"])
+def test_levels_shares_are_means_over_devices(frame, kind):
+    light, made, eye, material = frame
+    method = adaptive.Levels(threshold=0.02, diffuse_threshold=0.03)
+    expected = adaptive.shade(light, made, eye, material, method)
+    kind = getattr(jax.sharding.AxisType, kind)
+    mesh = jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+    made, material = jax.device_put((made, material), NamedSharding(mesh, P("rows")))
+    light, eye = jax.device_put((light, eye), NamedSharding(mesh, P()))
+    found = adaptive.shade(light, made, eye, material, method)
+    assert 0 < float(expected.active_fraction["specular"][-1]) < 1
+    for name, share in expected.active_fraction.items():
+        np.testing.assert_array_equal(found.active_fraction[name], share)
+        np.testing.assert_array_equal(found.shown_degree[name], expected.shown_degree[name])
+    np.testing.assert_allclose(found.relative_cost, expected.relative_cost, rtol=1e-6)
 
 
 def sharded(tree):
