@@ -29,10 +29,9 @@ def filtered_by_device(
     arguments = light, transfer, eye, material, options, previous
     if all(kind == AxisType.Manual for kind in types):  # inside `shard_map`
         return filtered(*arguments, compact=True)
-    given = sharding
-    if is_concrete(transfer.coefficients):
-        given = transfer.coefficients.sharding
-        mesh = given.mesh
+    given = transfer.coefficients.sharding if is_concrete(transfer.coefficients) else sharding
+    assert isinstance(given, jax.sharding.NamedSharding)  # it is on a mesh
+    mesh = given.mesh
     names = next(iter(given.spec), None)
     # Automatic axes do not tell a trace how they are used: all of them are, where that goes.
     unknown = AxisType.Auto in types and not is_concrete(transfer.coefficients)
@@ -55,4 +54,5 @@ def filtered_by_device(
 
     specs, out = (whole, rows, whole, lobes, whole, rows), (rows, whole, whole, rows)
     run = jax.shard_map(one, mesh=mesh, in_specs=specs, out_specs=out)
-    return AdaptiveResult(*run(*arguments))
+    color, fractions, cost, degrees = run(*arguments)
+    return AdaptiveResult(color, fractions, cost, degrees)

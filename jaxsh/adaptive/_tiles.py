@@ -222,8 +222,8 @@ def arranged_in_slices(
 
     Looks at no values, so that it waits for nothing that is under way on the device.
     """
-    rule = tuple(jnp.asarray(part, transfer.positions.dtype) for part in rule)
-    rows, *outline = outlined(transfer, tiling, rule[0], rule[1])
+    parts = tuple(jnp.asarray(part, transfer.positions.dtype) for part in rule)
+    rows, *outline = outlined(transfer, tiling, parts[0], parts[1])
     blocks = len(tiling.tile)
     size, done = equal_blocks(blocks, -(-blocks // slices)), []
     for start in range(0, blocks, size):
@@ -234,7 +234,7 @@ def arranged_in_slices(
         if start + size < blocks:
             yield None
     samples, scales = (jnp.concatenate(parts) for parts in zip(*done, strict=True))
-    yield _tile_set(tiling, place, rule, diffuse, (samples, scales, *outline))
+    yield _tile_set(tiling, place, parts, diffuse, (samples, scales, *outline))
 
 
 def _tile_set(tiling, place, rule, diffuse, arranged) -> TileSet:
