@@ -59,9 +59,17 @@ class Options:
 def run(options: Options) -> dict[str, Any]:
     """Measure, and return all of it."""
     start = time.monotonic()
+    # What would fail after minutes fails here.
+    wanted = re.compile(options.only)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
     report: dict[str, Any] = {"date": datetime.datetime.now(datetime.UTC).isoformat("T", "seconds")}
     # First, in a process of their own: two would share the device's memory.
     report["tests"] = _tests(options) if options.test_seconds and options.tests else None
+    report |= {"cases": (done := []), "left_out": (left_out := [])}
+    left = options.at_most - (time.monotonic() - start)
+    watch = threading.Timer(max(left, 0), _give_up, (report, options.out))
+    watch.daemon = True
+    watch.start()
     import jax
 
     from . import _gpu_cases, _gpu_limits
@@ -77,19 +85,13 @@ def run(options: Options) -> dict[str, Any]:
         seconds, _ = _time(jax.jit(probe.function), probe.arguments, options.rounds)
         limits[name] = {"value": probe.amount / seconds, "unit": probe.unit}
     report["vendor"] = _gpu_limits.vendor(jax.devices()[0].device_kind)
-    report["cases"] = done = []
-    report["left_out"] = left_out = []
-    left = options.at_most - (time.monotonic() - start)
-    watch = threading.Timer(left, _give_up, (report, options.out))
-    watch.daemon = True
-    watch.start()
     full: dict[str, Any] = {}
 
     def late() -> bool:
         return time.monotonic() - start > options.seconds
 
     for case in _all(_gpu_cases.cases(sizes), late, left_out):
-        if not re.search(options.only, case.name):
+        if not wanted.search(case.name):
             continue
         if late():
             left_out.append(case.name)
@@ -101,6 +103,8 @@ def run(options: Options) -> dict[str, Any]:
         report["seconds"] = time.monotonic() - start
         write(options.out, to_json(report))
     watch.cancel()
+    if not done and not left_out:
+        left_out.append(f"all: no case has {options.only!r} in its name")
     report["seconds"] = time.monotonic() - start
     write(options.out, to_json(report))
     return report
@@ -108,11 +112,13 @@ def run(options: Options) -> dict[str, Any]:
 
 def _give_up(report: dict[str, Any], out: Path) -> None:
     """Ends the process: a compiler cannot be told to stop."""
-    report["left_out"].append("all after the last case: the time was over")
-    said = to_json(dict(report))
-    write(out, said)
-    print(said, flush=True)
-    os._exit(1)
+    try:
+        report["left_out"].append("all after the last case: the time was over")
+        said = to_json(dict(report))
+        write(out, said)
+        print(said, flush=True)
+    finally:
+        os._exit(1)
 
 
 def _all(groups, late: Callable[[], bool], left_out: list[str]) -> Iterator[Any]:

@@ -1,6 +1,7 @@
 """`python -m benchmarks.gpu` runs on a CPU too, with tiny sizes."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -51,6 +52,11 @@ def test_the_data_sheet_is_found_by_the_device():
     assert _gpu_limits.vendor("cpu") is None
 
 
+def test_a_wrong_expression_is_refused_before_the_work(tmp_path):
+    with pytest.raises(re.error):
+        gpu.run(gpu.Options(only="(", out=tmp_path / "gpu.json"))
+
+
 @pytest.mark.slow
 def test_tiles_are_repeated():
     [case] = _gpu_cases._tiles(301, 80)  # 3 × 100
@@ -82,7 +88,7 @@ def test_it_ends_in_time_with_what_there_is(tmp_path):
 @pytest.mark.slow
 def test_every_case_runs(tmp_path):
     # In a process of its own, as at a user's: the session's strictness is not for it.
-    out = tmp_path / "gpu.json"
+    out = tmp_path / "results" / "gpu.json"  # no clone has that folder
     options = ["--sizes", "tiny", "--rounds", "1", "--out", str(out)]
     tests = ["--test-seconds", "60", "--tests", "harmonics/test_indexing.py"]
     command = [sys.executable, "-m", "benchmarks.gpu", *options, *tests]
