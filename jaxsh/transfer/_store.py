@@ -144,26 +144,22 @@ class BlockStore:
 
         After a power cut a file may be there without its bytes, which its checksum tells.
         """
-        array, file, own = self._array(name), self._file(name, block), self._sum_file(name, block)
-        part = slice(block * array.chunks[0], block * array.chunks[0] + len(values))
-        with _written(file):
-            try:
-                array[part] = values
-            except FileNotFoundError:  # another process finished, and dropped what is half written
-                array[part] = values
-            _put_beside(own, _sum_of(file))
+        written = self._write(name, block, values)
+        with _written(self._file(name, block)):
+            _put_beside(self._sum_file(name, block), written)
 
     def put(self, **arrays: np.ndarray) -> None:
         """Write complete arrays, but the blocks that are there and right already."""
-        mended = []
+        changed = {}
         for name, values in arrays.items():
             size, missing = self._array(name).chunks[0], self.missing(name, check=True)
+            sums = [self._complete(name, block) for block in range(_blocks(self._array(name)))]
             for block in missing:
-                self.write(name, block, values[block * size : (block + 1) * size])
+                sums[block] = self._write(name, block, values[block * size : (block + 1) * size])
             if missing:
-                mended.append(name)
-        if mended:
-            self.settle(*mended)
+                changed[name] = b"".join(sums).hex()
+        if changed:
+            self._record(changed, {})
 
     def add(self, later: dict[str, tuple[tuple[int, ...], np.dtype]]) -> None:
         """Make room for those arrays, of shapes and dtypes, that are not there.
@@ -198,8 +194,7 @@ class BlockStore:
 
         Raises `DamagedError` where a block was lost since it was written.
         """
-        _, self.attributes = open_group(self.path, "r")  # another process may have been here first
-        sums = dict(self.attributes.get(_SUMS, {}))
+        sums = {}
         for name in names:
             found = []
             for block in range(_blocks(self._array(name))):
@@ -211,10 +206,7 @@ class BlockStore:
                 if found[-1] not in self._sums(name, block):
                     raise DamagedError(self._problem(file, "not what was written there"))
             sums[name] = b"".join(found).hex()
-        values[_SUMS] = sums
-        with _written(self.path):
-            self._group.attrs.update(values)
-        self.attributes |= values
+        self._record(sums, values)
         self.drop(*(f"{name}/{_SUMS}" for name in names))
 
     def tidy(self, name: str) -> None:
@@ -235,10 +227,30 @@ class BlockStore:
 
     def _sums(self, name: str, block: int) -> Iterator[bytes]:
         """Give the checksums that a block may have: of the complete array, and written since."""
-        complete = self.attributes.get(_SUMS, {}).get(name, "")
-        yield bytes.fromhex(complete[2 * _SUM * block : 2 * _SUM * (block + 1)])
+        yield self._complete(name, block)
         with contextlib.suppress(OSError):
             yield self._sum_file(name, block).read_bytes()
+
+    def _complete(self, name: str, block: int) -> bytes:
+        digits = self.attributes.get(_SUMS, {}).get(name, "")
+        return bytes.fromhex(digits[2 * _SUM * block : 2 * _SUM * (block + 1)])
+
+    def _record(self, sums: dict[str, str], values: dict[str, Any]) -> None:
+        _, now = open_group(self.path, "r")  # another process may have been here meanwhile
+        values = values | {_SUMS: now.get(_SUMS, {}) | sums}
+        with _written(self.path):
+            self._group.attrs.update(values)
+        self.attributes = now | values
+
+    def _write(self, name: str, block: int, values: np.ndarray) -> bytes:
+        array, file = self._array(name), self._file(name, block)
+        part = slice(block * array.chunks[0], block * array.chunks[0] + len(values))
+        with _written(file):
+            try:
+                array[part] = values
+            except FileNotFoundError:  # another process finished, and dropped what is half written
+                array[part] = values
+            return _sum_of(file)
 
     def _sum_file(self, name: str, block: int) -> Path:
         return self.path.joinpath(name, _SUMS, str(block))

@@ -50,9 +50,13 @@ class StoredTransfer:
     path: Path
     num_points: int
     degree: int
-    dtype: np.dtype  # of the colors that it shades: float32 where JAX's x64 is off
     block_rows: int  # vertices in a block; the last may have fewer
     _store: BlockStore = dataclasses.field(repr=False, compare=False)
+
+    @property
+    def dtype(self) -> np.dtype:
+        """The dtype of the colors that it shades: float32 where JAX's x64 is off."""
+        return np.dtype(jax.dtypes.canonicalize_dtype(self._store.dtype))
 
     def blocks(self) -> Iterator[tuple[slice, Transfer]]:
         """Give each block with the vertices that it holds, the next being read meanwhile.
@@ -191,7 +195,8 @@ def open(path: str | os.PathLike[str]) -> StoredTransfer:
     It is a Zarr 3 group of the arrays `coefficients` (V, K), `positions`, `normals` and `neighbors`
     of a `Transfer`, and `faces`, `unit_normals`, `origins` of rays and `albedo`, which bakes go on
     from. Each is in chunks of the same number of rows, little-endian with a CRC-32C. Attributes
-    say the format, its version, the degree, the bake's arguments and the mesh's fingerprint.
+    say the format, its version, the degree, the bake's arguments, the mesh's fingerprint and all
+    checksums, by which a chunk that took another's place is told.
 
     Raises `FileNotFoundError` where nothing is there, and `ValueError`, naming the path and the
     problem, for another thing, a newer version, and a bake that is not finished. Blocks whose bytes
@@ -222,7 +227,6 @@ def open(path: str | os.PathLike[str]) -> StoredTransfer:
         path=path,
         num_points=store.num_points,
         degree=degree_of(store.width),
-        dtype=np.dtype(jax.dtypes.canonicalize_dtype(store.dtype)),
         block_rows=store.block_rows,
         _store=store,
     )

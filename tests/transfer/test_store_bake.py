@@ -107,7 +107,7 @@ def stopped(tmp_path_factory):
     [
         ({"seed": 1}, "seed is 0, and 1 here"),
         ({"directions": 64}, "directions is 128, and 64 here"),
-        ({"albedo": 0.3}, "albedo is"),
+        ({"albedo": 0.3}, "albedo is 0.5, and 0.3 here"),
         ({"bounces": 2}, "bounces is 1, and 2 here"),
         ({"ray_bias": 1e-3}, "ray_bias is"),
         ({"shadows": False, "bounces": 0}, "shadows is True, and False here"),
@@ -157,6 +157,14 @@ def test_a_bake_goes_on_in_single_precision(tmp_path, whole):
     with jax.enable_x64(False):
         got = run(Scene(), path)
     np.testing.assert_array_equal(got, whole[0])
+
+
+def test_an_albedo_of_another_dtype_is_the_same(tmp_path, whole):
+    path = tmp_path / "knot"
+    np.testing.assert_array_equal(run(Scene(), path, albedo=np.float32(0.5)), whole[0])
+    scene = Scene()
+    np.testing.assert_array_equal(run(scene, path), whole[0])
+    assert scene.asked <= 1  # where rays start
 
 
 def test_a_store_changes_nothing(tmp_path):

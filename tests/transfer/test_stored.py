@@ -109,6 +109,6 @@ def test_doubles_are_stored_and_shaded_in_what_jax_computes_in(tmp_path):
         stored = open_store(tmp_path)
         colors = shade_diffuse(light.astype(np.float32), stored, 0.5)
         read = stored.load()
-    assert stored.dtype == colors.dtype == read.coefficients.dtype == read.positions.dtype
-    assert stored.dtype == np.float32
+        assert stored.dtype == colors.dtype == read.coefficients.dtype == read.positions.dtype
+        assert stored.dtype == np.float32
     np.testing.assert_allclose(colors, exact, rtol=0, atol=1e-7)  # 7e-8 measured

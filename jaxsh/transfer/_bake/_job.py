@@ -34,8 +34,9 @@ class BakeArguments:
     def identity(self, mesh: Mesh) -> dict[str, Any]:
         """Give what tells this bake from others, for a store's attributes (JSON)."""
         plain = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        share = self.albedo.astype(np.float64)  # of whatever dtype it is given
         return plain | {
-            "albedo": fingerprint(self.albedo),
+            "albedo": fingerprint(share) if share.ndim else float(share),
             "mesh": fingerprint(mesh.vertices, mesh.faces, mesh.normals),
         }
 

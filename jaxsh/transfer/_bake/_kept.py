@@ -37,7 +37,7 @@ class BakeStore(BlockStore):
             "faces": np.asarray(mesh.faces),
             "unit_normals": job.prepared.normals,
             "origins": job.prepared.origins,
-            "albedo": np.atleast_1d(job.arguments.albedo),
+            "albedo": np.atleast_1d(job.arguments.albedo).astype(np.float64),
         }
         names = [_name(number, job.passes) for number in range(job.passes)]
         later = {name: ((job.num_points, job.width), job.dtype) for name in names}
