@@ -24,7 +24,7 @@ from .._core.host import cores
 from ..geometry import Mesh, RayScene, ray_scene
 from ..sphere import Suns
 from ._bake._directions import spread
-from ._bake._faults import check_arguments
+from ._bake._faults import check_rays
 from ._bake._origins import origins
 from ._bake._receivers import unit_normals
 from ._glossy_kernels import unit
@@ -145,7 +145,7 @@ def sun_visibility(
     mesh = surface
     if not isinstance(mesh, Mesh):
         mesh = Mesh(positions, jnp.zeros((0, 3), jnp.int32), normals)
-    check_arguments(mesh, count, True, 0, 0.5, ray_bias, offset, 1)
+    check_rays(mesh, ray_bias, offset)
     scene = ray_scene(mesh) if scene is None else scene
     upright = unit_normals(mesh)
     start = origins(mesh, upright, scene, ray_bias, offset).positions

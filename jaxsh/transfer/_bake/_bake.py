@@ -1,7 +1,6 @@
 """Baking transfer: rays for every vertex, projected."""
 
 import functools
-import operator
 import os
 import warnings
 from collections.abc import Callable
@@ -13,13 +12,13 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
 from ... import geometry
-from ..._core.checks import as_host_float, as_path, check_degree, check_size, check_type
+from ..._core.checks import as_path
 from ...geometry import Mesh, RayScene
 from .._transfer import Transfer
 from ._blind import why_blind
-from ._device import DeviceJob, job_of, scene_for, takes_device
-from ._faults import check_arguments, faults
-from ._job import BakeArguments, Prepared
+from ._device import DeviceJob, job_of, scene_for
+from ._faults import checked, faults
+from ._job import Prepared
 from ._kept import BakeStore, refuse
 from ._origins import origins
 from ._passes import Passes, progress_bar
@@ -112,24 +111,20 @@ def bake(
     >>> baked.coefficients.shape, baked.degree
     ((300, 9), 2)
     """
-    degree = check_degree(degree)
-    seed = check_size("seed", seed, least=0)
-    if scene is not None:
-        check_type("scene", scene, RayScene)
     path = None if store is None else as_path(store, "store").absolute()
-    check_arguments(mesh, directions, shadows, bounces, albedo, ray_bias, offset, chunk)
-    on_device = takes_device(device, scene)
-    arguments = BakeArguments(
-        degree=degree,
-        directions=operator.index(directions),
-        shadows=bool(shadows),
-        bounces=operator.index(bounces),
-        albedo=as_host_float(albedo, "albedo"),
-        ray_bias=None if ray_bias is None else float(ray_bias),
-        offset=None if offset is None else float(offset),
+    arguments = checked(
+        mesh,
+        degree,
+        directions=directions,
+        shadows=shadows,
+        bounces=bounces,
+        albedo=albedo,
+        ray_bias=ray_bias,
+        offset=offset,
         seed=seed,
-        scene=scene is not None,
-        device=on_device and bool(shadows),
+        chunk=chunk,
+        scene=scene,
+        device=device,
     )
     identity = {} if path is None else arguments.identity(mesh)
     if path is not None:
@@ -137,7 +132,7 @@ def bake(
     normals = unit_normals(mesh)
     caster, start, positions = None, None, np.asarray(mesh.vertices)
     if shadows:
-        caster = scene_for(mesh, on_device) if scene is None else scene
+        caster = scene_for(mesh, arguments.device) if scene is None else scene
         start = origins(mesh, normals, caster, ray_bias, offset)
         positions = start.positions
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import itertools
-import operator
 import os
 import uuid
 import warnings
@@ -12,15 +11,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import ArrayLike, Float, Int
 
-from ..._core.checks import as_host_float, as_path, check_degree, check_flag, check_size
+from ..._core.checks import as_path, check_flag
 from ..._core.host import cores
 from ..._core.words import reason
 from ...geometry import Mesh
 from .._stored import StoredTransfer, open
 from ._blind import why_blind
 from ._device import job_of, scene_for
-from ._faults import check_arguments, faults
-from ._job import BakeArguments, Prepared
+from ._faults import checked, faults
+from ._job import Prepared
 from ._kept import BakeStore, refuse
 from ._origins import origins
 from ._passes import progress_bar
@@ -96,18 +95,18 @@ def bake_on(
     (300, 2)
     """
     path = as_path(store, "store").absolute()
-    degree, seed = check_degree(degree), check_size("seed", seed, least=0)
-    check_arguments(mesh, directions, shadows, bounces, albedo, ray_bias, offset, chunk)
-    arguments = BakeArguments(
-        degree=degree,
-        directions=operator.index(directions),
-        shadows=bool(shadows),
-        bounces=operator.index(bounces),
-        albedo=as_host_float(albedo, "albedo"),
-        ray_bias=None if ray_bias is None else float(ray_bias),
-        offset=None if offset is None else float(offset),
+    arguments = checked(
+        mesh,
+        degree,
+        directions=directions,
+        shadows=shadows,
+        bounces=bounces,
+        albedo=albedo,
+        ray_bias=ray_bias,
+        offset=offset,
         seed=seed,
-        device=check_flag("device", device) and bool(shadows),
+        chunk=chunk,
+        device=check_flag("device", device),
     )
     identity = arguments.identity(mesh)
     refuse(path, identity)

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from ..._core.checks import (
     as_host_float,
     as_host_integer,
+    check_degree,
     check_faces,
     check_finite,
     check_flag,
@@ -16,23 +17,66 @@ from ..._core.checks import (
     check_size,
     check_type,
 )
-from ...geometry import Mesh
+from ...geometry import Mesh, RayScene
 from ._blind import why_undefined
+from ._device import takes_device
+from ._job import BakeArguments
 
 
-def check_arguments(
+def checked(
     mesh: Mesh,
+    degree: int,
+    *,
     directions: int,
     shadows: bool,
     bounces: int,
     albedo: Any,
     ray_bias: float | None,
     offset: float | None,
+    seed: int,
     chunk: int,
-) -> None:
-    """Raise `ValueError` that says which of `bake`'s arguments is wrong, and how."""
+    scene: RayScene | None = None,
+    device: bool | None,
+) -> BakeArguments:
+    """Give the arguments of `bake` and `bake_on` that decide a bake's bits.
+
+    Raises `ValueError` or `TypeError` that says which argument is wrong, and how.
+    """
+    if scene is not None:
+        check_type("scene", scene, RayScene)
+    degree = check_degree(degree)
+    seed = check_size("seed", seed, least=0)
+    check_rays(mesh, ray_bias, offset)
+    shadows = check_flag("shadows", shadows)
+    directions = check_size("directions", directions)
+    bounces = check_size("bounces", bounces, least=0)
+    check_size("chunk", chunk)
+    if bounces and not shadows:
+        raise ValueError(f"bounces={bounces} needs rays, and shadows=False casts none")
+    share = as_host_float(albedo, "albedo")
+    if share.shape not in ((), (len(mesh.vertices),)):
+        raise ValueError(
+            f"albedo must be a number or have shape ({len(mesh.vertices)},), got shape "
+            f"{share.shape}"
+        )
+    check_finite("albedo", share, least=0.0, wait=True)
+    return BakeArguments(
+        degree=degree,
+        directions=directions,
+        shadows=shadows,
+        bounces=bounces,
+        albedo=share,
+        ray_bias=None if ray_bias is None else float(ray_bias),
+        offset=None if offset is None else float(offset),
+        seed=seed,
+        scene=scene is not None,
+        device=takes_device(device, scene) and shadows,
+    )
+
+
+def check_rays(mesh: Mesh, ray_bias: float | None, offset: float | None) -> None:
+    """Raise `ValueError` or `TypeError` where rays cannot start from the vertices of a mesh."""
     check_type("mesh", mesh, Mesh)
-    check_flag("shadows", shadows)
     vertices = as_host_float(mesh.vertices, "vertices of the mesh")
     faces = as_host_integer(mesh.faces, "faces of the mesh")
     as_host_float(mesh.normals, "normals of the mesh")
@@ -45,22 +89,11 @@ def check_arguments(
         bad = int((~np.isfinite(vertices).all(axis=1)).sum())
         raise ValueError(f"the mesh has {bad} NaN or infinite vertices; make_mesh drops such")
     check_faces("the mesh", faces, len(vertices))
-    check_size("directions", directions)
-    check_size("bounces", bounces, least=0)
-    check_size("chunk", chunk)
-    if bounces and not shadows:
-        raise ValueError(f"bounces={bounces} needs rays, and shadows=False casts none")
     for name, value in (("ray_bias", ray_bias), ("offset", offset)):
         if value is not None:
             check_number(name, value, above=0.0)
     if ray_bias is not None and offset is not None:
         raise ValueError(f"expected ray_bias or offset, not both: got {ray_bias!r} and {offset!r}")
-    share = as_host_float(albedo, "albedo")
-    if share.shape not in ((), (len(vertices),)):
-        raise ValueError(
-            f"albedo must be a number or have shape ({len(vertices)},), got shape {share.shape}"
-        )
-    check_finite("albedo", share, least=0.0, wait=True)
 
 
 def faults(
