@@ -14,7 +14,8 @@ from urllib.parse import unquote, urlsplit
 
 from mkdocs.plugins import event_priority
 
-SOUGHT = ("gaussian", "splat", "unity", "three.js", "texture", "torch", "gpu", "tutorial")
+SOUGHT = ["gaussian", "splat", "unity", "three.js", "texture", "torch", "gpu", "tutorial", "tpu"]
+SOUGHT += ["multi-gpu", "cluster", "dask", "out of core", "memory"]
 _LOG = logging.getLogger("mkdocs.hooks.checks")
 # What a browser loads by itself, with the attribute that says from where.
 _LOADED = {"img": "src", "script": "src", "iframe": "src", "link": "href", "source": "src"}
