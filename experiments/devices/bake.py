@@ -2,8 +2,6 @@
 
 import dataclasses
 import functools
-import math
-import os
 import time
 import warnings
 from typing import Any, NamedTuple
@@ -14,6 +12,7 @@ import numpy as np
 from jaxsh import geometry, transfer
 
 from ..runner import Context, Table, experiment
+from .workers import Counting, cores
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,24 +40,6 @@ class Config:
             raise ValueError("expected sizes and rounds of at least 1, and bounces of at least 0")
 
 
-class _Counting:
-    """A scene that counts the rays it is asked for."""
-
-    def __init__(self, scene: geometry.RayScene):
-        self._scene, self._asked = scene, []
-
-    def occluded(self, origins, directions, max_distance: Any = math.inf):
-        self._asked.append(len(origins))  # a list, since calls come from several threads
-        return self._scene.occluded(origins, directions, max_distance)
-
-    def closest_hit(self, origins, directions):
-        self._asked.append(len(origins))
-        return self._scene.closest_hit(origins, directions)
-
-    def rays(self) -> int:
-        return sum(self._asked)
-
-
 class _Took(NamedTuple):
     """What a bake took."""
 
@@ -75,7 +56,7 @@ def bake(config: Config, context: Context) -> list[Table]:
         for bounces in config.bounces:
             context.record({"mesh": name} | _beside(mesh, bounces, config, context.seed))
     device = jax.devices()[0]
-    about = {"device": device.device_kind, "cores": os.cpu_count()}
+    about = {"device": device.device_kind, "cores": cores()}
     return [Table("How far apart they are"), Table("How fast they are", values=about)]
 
 
@@ -84,7 +65,7 @@ def _beside(mesh: geometry.Mesh, bounces: int, config: Config, seed: int) -> dic
     baked = functools.partial(
         transfer.bake, mesh, config.degree, bounces=bounces, seed=seed, progress=False
     )
-    counting = _Counting(embree)
+    counting = Counting(embree)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # vertices that see nothing
         baked(directions=config.directions, scene=counting, device=False)
@@ -100,7 +81,7 @@ def _beside(mesh: geometry.Mesh, bounces: int, config: Config, seed: int) -> dic
                     best[way] = took
         many = config.reference * config.directions
         reference = np.asarray(baked(directions=many, scene=embree, device=False).coefficients)
-    rays, host, device = counting.rays(), best["host"], best["device"]
+    rays, host, device = counting.rays, best["host"], best["device"]
     difference = _relative(device.coefficients, host.coefficients)
     sampling = _relative(host.coefficients, reference)
     return {
