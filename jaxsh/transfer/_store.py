@@ -116,7 +116,7 @@ class BlockStore:
         numbers, expected = data[:-_SUM], data[-_SUM:]
         if not whole or crc32c(numbers) != int.from_bytes(expected, "little"):
             raise DamagedError(self._problem(file, "damaged"))
-        if expected.tobytes() not in self._sums(name, block):
+        if not self._known(name, block, expected.tobytes()):
             raise DamagedError(self._problem(file, "not what was written there"))
         stored = numbers.view(array.dtype.newbyteorder("<")).reshape(array.chunks)
         return stored[:rows].astype(array.dtype, copy=False)
@@ -203,7 +203,7 @@ class BlockStore:
                     found.append(_sum_of(file))
                 except OSError:
                     raise DamagedError(self._problem(file, "missing")) from None
-                if found[-1] not in self._sums(name, block):
+                if not self._known(name, block, found[-1]):
                     raise DamagedError(self._problem(file, "not what was written there"))
             sums[name] = b"".join(found).hex()
         self._record(sums, values)
@@ -224,6 +224,13 @@ class BlockStore:
         for left in self.path.rglob("*.partial"):
             with contextlib.suppress(OSError):
                 left.unlink()
+
+    def _known(self, name: str, block: int, checksum: bytes) -> bool:
+        """Tell whether a block that was written here has a checksum."""
+        if checksum in self._sums(name, block):
+            return True
+        _, self.attributes = open_group(self.path, "r")  # as another process may have finished
+        return checksum in self._sums(name, block)
 
     def _sums(self, name: str, block: int) -> Iterator[bytes]:
         """Give the checksums that a block may have: of the complete array, and written since."""
@@ -312,18 +319,18 @@ def make(
 
 def sweep(path: Path) -> None:
     """Delete what processes of this machine that were killed in `make` have left beside a path."""
+    path, found = path.resolve(), []
     start = f".{path.name}.{socket.gethostname()}-"
-    if os.name != "posix" or not path.parent.is_dir():
-        return
-    for left in path.parent.iterdir():
-        if left.name.startswith(start) and left.name.endswith(".partial"):
-            pid = left.name[len(start) :].partition("-")[0]
-            try:
-                os.kill(int(pid), 0)  # asks whether it lives
-            except ProcessLookupError:
-                shutil.rmtree(left, ignore_errors=True)
-            except (OSError, ValueError):
-                pass
+    if os.name == "posix":
+        with contextlib.suppress(OSError):
+            found = [left for left in path.parent.iterdir() if left.name.startswith(start)]
+    for left in found:
+        try:
+            os.kill(int(left.name[len(start) :].partition("-")[0]), 0)  # asks whether it lives
+        except ProcessLookupError:
+            shutil.rmtree(left, ignore_errors=True)
+        except (OSError, ValueError, OverflowError):
+            pass
 
 
 @contextlib.contextmanager

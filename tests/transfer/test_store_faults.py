@@ -17,6 +17,7 @@ import stopping
 from jaxsh.transfer import bake, shade_diffuse
 from jaxsh.transfer import open as open_store
 from jaxsh.transfer._bake import _kept
+from jaxsh.transfer._bake._kept import BakeStore
 from jaxsh.transfer._store import sweep
 
 OPTIONS = {"directions": 128, "bounces": 1, "progress": False}
@@ -184,6 +185,20 @@ def test_a_store_that_another_process_makes_meanwhile_is_gone_on_with(finished, 
     with pytest.raises(ValueError, match="the store of another bake: its seed is 0, and 1 here"):
         bake(stopping.MESH, 1, store=finished, shadows=False, seed=1, progress=False)
     assert [file.name for file in finished.parent.iterdir()] == ["knot"]
+
+
+def test_two_processes_may_finish_one_after_the_other(tmp_path):
+    path = tmp_path / "knot"
+    with pytest.raises(KeyboardInterrupt):
+        bake(stopping.MESH, 2, store=path, scene=stopping.Scene(9), **OPTIONS, chunk=64)
+    one, two = BakeStore(path), BakeStore(path)
+    for store in one, two:
+        for block in range(one.num_blocks):
+            store.write_pass(1, block, np.full_like(one.read_pass(0, 0), 1)[: 700 - 64 * block])
+    for store in one, two:
+        store.finish("")
+        assert not list(path.rglob("sums"))
+    assert one.finished
 
 
 def test_what_a_killed_process_began_is_deleted(tmp_path):

@@ -56,6 +56,7 @@ class BakeStore(BlockStore):
         if store.finished:
             store.tidy("coefficients")  # where it was stopped at that
             store.drop(_PASSES)
+            sweep(path)
         else:
             store.add(later)
         return store
