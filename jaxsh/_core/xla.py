@@ -67,11 +67,16 @@ def rounded_once(function, *arguments):
     return jax.lax.optimization_barrier(materialize(function, *arguments))
 
 
-def in_turn(function, tree, *, most: int | None = None):
+def in_turn(function, tree, *, most: int | None = None, lapack: bool = False):
     """`function` of each row of a tree of arrays: one after the other on one CPU, else all at once.
 
     For rows that are large themselves, where a batch would only leave the cache. `most` is the
     number of rows that an accelerator takes at once, as far as its memory goes.
+
+    With `lapack`, for a function that factors matrices and rows that no devices share out, also on
+    several CPU devices one comes after the other: jaxlib gives LAPACK's batches to the threads that
+    the devices' programs run on, and waits there. Two devices that do so at once wait forever
+    (jaxlib 0.10.2, two cores).
     """
     rows = len(jax.tree.leaves(tree)[0])
 
@@ -83,7 +88,7 @@ def in_turn(function, tree, *, most: int | None = None):
             return jax.vmap(function)(tree)
         return jax.lax.map(jax.checkpoint(function), tree, batch_size=most)
 
-    if on_mesh(tree):
+    if on_mesh(tree) and not lapack:
         return jax.vmap(function)(tree)
     return jax.lax.platform_dependent(tree, cpu=loop, default=batched)
 

@@ -65,7 +65,7 @@ def solve_colored(
     def again(logs):
         colors = scaled(jnp.exp(logs))
         b = jnp.moveaxis(targets, 1, 0).reshape(3, -1, 1)
-        small = jax.vmap(triangle)(jnp.concatenate([lit(colors), b], axis=-1))
+        small = in_turn(triangle, jnp.concatenate([lit(colors), b], axis=-1), lapack=True)
         found = solve(small[..., :width], small[..., width], pixels, scale)
         gray = einsum("mrk,ck->mcr", operators, found.light)
         own = jnp.sum(gray**2, axis=-1)
@@ -84,7 +84,8 @@ def _inverse(found, colors, share, operator, count) -> Float[Array, "3 k k"]:
     """The Hessian's inverse of the light, that the colors are unknown taken into account."""
     width = operator.shape[-1]
 
-    def one(matrix, light, pull, color):
+    def one(channel):
+        matrix, light, pull, color = channel
         rows = len(matrix) // count
         shaded = matmul(matrix, light).reshape(count, rows)
         # Of logarithms q: log a = q - log Σ share·exp(q), with the first at rest.
@@ -97,4 +98,4 @@ def _inverse(found, colors, share, operator, count) -> Float[Array, "3 k k"]:
         whole = jnp.concatenate([above, below], axis=0)
         return covariance(whole, jnp.ones((), light.dtype))[:width, :width]
 
-    return jax.vmap(one)(operator, found.light, found.pull, colors.T)
+    return in_turn(one, (operator, found.light, found.pull, colors.T), lapack=True)

@@ -66,7 +66,7 @@ def compress_rows(observed, rows, albedo, weights, make) -> Shading:
     operators = jnp.moveaxis(operators, 1, 0).reshape(channels, -1, width)
     targets = jnp.moveaxis(targets, 1, 0).reshape(3, -1) / scale
     columns = targets.T[None] if channels == 1 else targets[..., None]
-    small = jax.vmap(triangle)(jnp.concatenate([operators, columns], axis=-1))
+    small = in_turn(triangle, jnp.concatenate([operators, columns], axis=-1), lapack=True)
     target = jnp.moveaxis(small[..., width:], -1, 0 if channels == 1 else 1).reshape(3, -1)
     return Shading(target, small[..., :width], scale)
 
@@ -84,18 +84,20 @@ def solve_plain(
     rcond = 10 * float(jnp.finfo(target.dtype).eps) * operator.shape[-1]
     solver = lx.SVD(rcond=rcond)
 
-    def one(matrix, b):
+    def one(pair):
+        matrix, b = pair
         return lx.linear_solve(lx.MatrixLinearOperator(matrix), b, solver, throw=False).value
 
-    light = jax.vmap(one)(operator, target)
+    light = in_turn(one, (operator, target), lapack=True)
     residual = jnp.linalg.norm(target - einsum("crk,ck->cr", operator, light))
     if noise is None:
-        rank = jax.vmap(functools.partial(jnp.linalg.matrix_rank, rtol=rcond))(operator)
+        rank_of = functools.partial(jnp.linalg.matrix_rank, rtol=rcond)
+        rank = in_turn(rank_of, operator, lapack=True)
         free = 3 * count - jnp.sum(rank).astype(count.dtype)
         # As many unknowns as pixels fit any data: these then do not tell how noisy they are.
         noise = jnp.where(free > 0.5, residual / jnp.sqrt(jnp.maximum(free, 1)), jnp.inf)
     unit = jnp.ones((), target.dtype)
-    inverse = jax.vmap(lambda matrix: covariance(matrix, unit))(operator)
+    inverse = in_turn(lambda matrix: covariance(matrix, unit), operator, lapack=True)
     known = jnp.isfinite(jnp.diagonal(inverse, axis1=1, axis2=2)).astype(target.dtype)
     return Solution(light, inverse, jnp.zeros_like(light), known, noise, residual)
 
@@ -126,7 +128,8 @@ def solve_with_prior(
     widths = jnp.sqrt(variances[1:])
     # The operator is a triangle: its first row alone holds the first coefficient.
     first, rest = operator[:, 0], operator[:, 1:, 1:] * widths[None, None]
-    u, d, vt = jnp.linalg.svd(rest, full_matrices=False)
+    svd = functools.partial(jnp.linalg.svd, full_matrices=False)
+    u, d, vt = in_turn(svd, rest, lapack=True)
     y = einsum("cri,cr->ci", u, target[:, 1:])
     across = jnp.sum((target[:, 1:] - einsum("cri,ci->cr", u, y)) ** 2)
     # Fewer pixels than unknowns leave directions that nothing is seen of: taken off here again.
@@ -170,11 +173,12 @@ def solve_with_prior(
     pull = jnp.concatenate([dark.astype(dtype), pull], axis=1)
     stacked = jnp.concatenate([operator, jax.vmap(jnp.diag)(pull)], axis=1)
 
-    def one(matrix, b):
+    def one(pair):
+        matrix, b = pair
         filled = jnp.concatenate([b, jnp.zeros(matrix.shape[1], dtype)])
         return lx.linear_solve(lx.MatrixLinearOperator(matrix), filled, lx.QR(), throw=False).value
 
-    light = jax.vmap(one)(stacked, target)
+    light = in_turn(one, (stacked, target), lapack=True)
     residual = jnp.linalg.norm(target - einsum("crk,ck->cr", operator, light))
     # The Hessian's inverse by the singular values: each is added to σ², so that none is too small.
     along = einsum("cik,ci->cik", vt, 1 / jnp.sqrt((scale[:, None] * d) ** 2 + level**2))

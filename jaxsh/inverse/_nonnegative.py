@@ -33,7 +33,7 @@ def nonnegative(
     def one(pair):
         return _nearest(pair[0], pair[1], rows, tolerance, max_steps)
 
-    moved, met, done = in_turn(one, (light, inverse))
+    moved, met, done = in_turn(one, (light, inverse), lapack=True)
     return moved, jnp.any(met), jnp.all(done)
 
 

@@ -58,7 +58,7 @@ def compress(
         return triangle(jnp.concatenate([shading, b], axis=1))
 
     columns = (seen / scale)[None] if shared else (seen / scale).T[..., None]
-    triangles = in_turn(of_channel, (albedo.T, columns))
+    triangles = in_turn(of_channel, (albedo.T, columns), lapack=True)
     operator, target = triangles[..., :count], triangles[..., count:]
     return Shading(jnp.moveaxis(target, -1, 0 if shared else 1).reshape(3, -1), operator, scale)
 

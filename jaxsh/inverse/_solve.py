@@ -1,5 +1,6 @@
 """Nonlinear least squares from many starts at once, and what the data tell of the answer."""
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -86,7 +87,8 @@ def levenberg_marquardt(
         return one(*pair)
 
     pairs = starts, constants
-    ends = jax.lax.map(each, pairs) if cpu_alone() else in_turn(each, pairs, most=most)
+    batched = functools.partial(in_turn, most=most, lapack=True)
+    ends = (jax.lax.map if cpu_alone() else batched)(each, pairs)
     values, residuals, results, steps = ends
     costs = jnp.sum(residuals**2, axis=-1)
     costs = jnp.where(jnp.isfinite(costs), costs, jnp.inf)

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int
 
 from .._core.checks import as_finite, check_size, described, nearest
 from .._core.linalg import matmul, triangle
-from .._core.xla import keep_rows, on_mesh
+from .._core.xla import in_turn, keep_rows, on_mesh
 
 _Named = Literal["gauss-newton", "levenberg-marquardt", "qr"]
 Solver = _Named | Any  # or an `optimistix.AbstractLeastSquaresSolver`
@@ -132,7 +132,7 @@ def _solve(design, targets, scales, solver, max_steps):
     def shared(design, targets, scales):
         # With the targets as one more column, the norm of what is left is that of all samples.
         tall = jnp.concatenate([scales[..., None] * design[None], targets[..., None]], axis=-1)
-        small = jax.vmap(triangle)(tall)
+        small = in_turn(triangle, tall, lapack=True)
         reduced = small[..., :-1], small[..., -1], jnp.ones_like(small[..., -1])
         return _of_each(*reduced, solver, max_steps)
 
@@ -159,4 +159,6 @@ def _of_each(design, targets, scales, solver, max_steps):
         return solution.value, solution.stats["num_steps"], solution.result
 
     one = linear if solver == "qr" else iterative
-    return jax.vmap(one, (None if design.ndim == 2 else 0, 0, 0))(design, targets, scales)
+    if design.ndim == 2:
+        return jax.vmap(one, (None, 0, 0))(design, targets, scales)
+    return in_turn(lambda problem: one(*problem), (design, targets, scales), lapack=True)
