@@ -239,12 +239,15 @@ class BlockStore:
             yield self._sum_file(name, block).read_bytes()
 
     def _complete(self, name: str, block: int) -> bytes:
-        digits = self.attributes.get(_SUMS, {}).get(name, "")
-        return bytes.fromhex(digits[2 * _SUM * block : 2 * _SUM * (block + 1)])
+        try:
+            digits = _sums_in(self.attributes)[name]
+            return bytes.fromhex(digits[2 * _SUM * block : 2 * _SUM * (block + 1)])
+        except (KeyError, TypeError, ValueError):  # not complete yet, or damaged
+            return b""
 
     def _record(self, sums: dict[str, str], values: dict[str, Any]) -> None:
         _, now = open_group(self.path, "r")  # another process may have been here meanwhile
-        values = values | {_SUMS: now.get(_SUMS, {}) | sums}
+        values = values | {_SUMS: _sums_in(now) | sums}
         with _written(self.path):
             self._group.attrs.update(values)
         self.attributes = now | values
@@ -344,6 +347,11 @@ def _written(path: Path) -> Iterator[None]:
             f"{path}: cannot be written: {reason(error)}; the blocks that are finished are kept, "
             "and the same call goes on from them",
         ) from error
+
+
+def _sums_in(attributes: dict[str, Any]) -> dict[str, Any]:
+    sums = attributes.get(_SUMS)
+    return sums if isinstance(sums, dict) else {}
 
 
 def _sum_of(file: Path) -> bytes:

@@ -25,7 +25,7 @@ def client():
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0"
         ) as cluster,
-        distributed.Client(cluster) as one,
+        distributed.Client(cluster, set_as_default=False) as one,
     ):
         yield one
 

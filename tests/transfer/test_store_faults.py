@@ -1,6 +1,7 @@
 """Bakes that the machine stops: killed, out of room, or with a store that was changed on disk."""
 
 import contextlib
+import json
 import os
 import resource
 import signal
@@ -185,6 +186,18 @@ def test_a_store_that_another_process_makes_meanwhile_is_gone_on_with(finished, 
     with pytest.raises(ValueError, match="the store of another bake: its seed is 0, and 1 here"):
         bake(stopping.MESH, 1, store=finished, shadows=False, seed=1, progress=False)
     assert [file.name for file in finished.parent.iterdir()] == ["knot"]
+
+
+@pytest.mark.parametrize("sums", [None, {"coefficients": 3}])
+def test_checksums_that_were_lost_are_made_again(finished, sums):
+    before = (finished / "zarr.json").read_text()
+    content = json.loads(before)
+    content["attributes"]["sums"] = sums
+    (finished / "zarr.json").write_text(json.dumps(content))
+    with pytest.raises(ValueError, match="is not what was written there: bake into it again"):
+        open_store(finished).load()
+    bake(stopping.MESH, 1, store=finished, shadows=False, progress=False)
+    assert json.loads((finished / "zarr.json").read_text()) == json.loads(before)
 
 
 def test_two_processes_may_finish_one_after_the_other(tmp_path):

@@ -159,6 +159,8 @@ def _connected(client: Any) -> Iterator[Any]:
     elif isinstance(client, Client):
         if client.asynchronous:
             raise TypeError("expected a client that waits, got one with asynchronous=True")
+        if client.status in ("closing", "closed"):
+            raise ConnectionError("bake_on: the client is closed")
         yield client
     else:
         raise TypeError(
@@ -195,7 +197,7 @@ def _answers(client: Any, task: Task, blocks: int) -> Iterator[tuple[int, bytes 
 
     waiting, name = iter(range(blocks)), f"bake-{uuid.uuid4().hex}-{task.number}"
     running: dict[Any, int] = {}
-    finished = as_completed()
+    finished = as_completed(loop=client.loop)  # the default client may be another
 
     def submit(most: int) -> None:
         for block in itertools.islice(waiting, most):
