@@ -205,6 +205,12 @@ def test_a_scene_may_hold_more_than_the_mesh():
     assert abs(under[top, 0]) * np.sqrt(4 * np.pi) < 1e-3
 
 
+@pytest.mark.slow
+def test_bounces_off_another_mesh_than_the_scenes_first_are_refused():
+    with pytest.raises(ValueError, match="expected a scene whose first mesh is the baked one"):
+        baked(knot(300), 1, directions=64, bounces=1, scene=ray_scene(knot(600)))
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
