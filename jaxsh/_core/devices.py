@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jax.sharding import AxisType, Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array, Shaped
 
@@ -86,6 +87,8 @@ def place(
         for device, index in sharding.addressable_devices_indices_map(whole).items()
         if index is not None
     ]
+    if any(isinstance(part, Tracer) for part in parts):  # of known values too
+        raise ValueError("arrays are placed on devices before jit, not inside")
     return jax.make_array_from_single_device_arrays(whole, sharding, parts)
 
 
