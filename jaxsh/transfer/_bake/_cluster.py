@@ -53,9 +53,9 @@ def bake_on(
     """Bake into a store on the workers of a Dask cluster, many machines if need be.
 
     A task is a block of vertices, whose coefficients a worker writes to the store by itself; the
-    scheduler sees nothing but their numbers. A worker reads what it needs from the store and
-    builds the tree of the mesh once. So a worker may die and others come at any time: what it was
-    at is done again. After any end of this call, the same call goes on with what is missing or
+    scheduler sees a bit a vertex at most. A worker reads what it needs from the store and builds
+    the tree of the mesh once. So a worker may die and others come at any time: what it was at is
+    done again. After any end of this call, the same call goes on with what is missing or
     damaged, and so does `bake(..., store=...)`, to the same bits (on processors of one kind).
 
     **Arguments**
