@@ -24,9 +24,7 @@ PARALLEL ?= -n auto --dist loadfile
 # Unoptimized machine code, by XLA's older way for loops on the CPU where this JAX still knows it: that
 # runs slower and compiles much faster, which is most of what tests do. Examples of docstrings, the oldest
 # JAX, test-all and a plain pytest go without.
-# The last: sums that CPU devices exchange at once may each hold a thread that the other waits for, forever.
-QUICK_COMPILE ?= --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false \
-	--xla_cpu_enable_concurrency_optimized_scheduler=false
+QUICK_COMPILE ?= --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false
 
 .PHONY: environments reproduce report readme test test-slow test-all test-oldest test-newest test-minimal check docs package bench gpu fuzz clean
 
