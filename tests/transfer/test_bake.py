@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 from jax.sharding import AxisType, NamedSharding, PartitionSpec
 
-from jaxsh.geometry import Mesh, _embree, knot, make_mesh, neighbors, ray_scene, vertex_normals
+from jaxsh.geometry import (
+    JaxRayScene,
+    Mesh,
+    _embree,
+    knot,
+    make_mesh,
+    neighbors,
+    ray_scene,
+    vertex_normals,
+)
 from jaxsh.harmonics import clamped_cosine, convolve, evaluate, rotate
 from jaxsh.transfer import bake
 from jaxsh.transfer._bake import _passes
@@ -205,10 +214,14 @@ def test_a_scene_may_hold_more_than_the_mesh():
     assert abs(under[top, 0]) * np.sqrt(4 * np.pi) < 1e-3
 
 
-@pytest.mark.slow
 def test_bounces_off_another_mesh_than_the_scenes_first_are_refused():
-    with pytest.raises(ValueError, match="expected a scene whose first mesh is the baked one"):
-        baked(knot(300), 1, directions=64, bounces=1, scene=ray_scene(knot(600)))
+    mesh = knot(300)
+    ground = bodies.rectangle((-2.0, -2.0, -2.0), (4.0, 0.0, 0.0), (0.0, 4.0, 0.0))
+    turned = make_mesh(np.asarray(mesh.vertices) @ [[0, 1, 0], [0, 0, 1], [1, 0, 0]], mesh.faces)
+    for others in ([knot(600)], [turned], [ground], [ground, mesh]):
+        for make in (ray_scene, JaxRayScene):
+            with pytest.raises(ValueError, match="expected a scene whose first mesh is the baked"):
+                baked(mesh, 1, directions=64, bounces=1, scene=make(others))
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from ...geometry import Mesh, RayScene
 from .._transfer import Transfer
 from ._blind import why_blind
 from ._device import DeviceJob, job_of, scene_for
-from ._faults import checked, faults
+from ._faults import check_first, checked, faults
 from ._job import Prepared
 from ._kept import BakeStore, refuse
 from ._origins import origins
@@ -135,6 +135,8 @@ def bake(
         caster = scene_for(mesh, arguments.device) if scene is None else scene
         start = origins(mesh, normals, caster, ray_bias, offset)
         positions = start.positions
+        if scene is not None and arguments.bounces:
+            check_first(mesh, scene, normals, start)
 
     def why(blind: Int[np.ndarray, " n"]) -> list[str]:
         if caster is None or start is None:

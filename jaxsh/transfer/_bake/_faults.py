@@ -21,6 +21,9 @@ from ...geometry import Mesh, RayScene
 from ._blind import why_undefined
 from ._device import takes_device
 from ._job import BakeArguments
+from ._origins import Origins
+
+_PROBED = 256  # vertices by which the mesh is known in a scene
 
 
 def checked(
@@ -94,6 +97,35 @@ def check_rays(mesh: Mesh, ray_bias: float | None, offset: float | None) -> None
             check_number(name, value, above=0.0)
     if ray_bias is not None and offset is not None:
         raise ValueError(f"expected ray_bias or offset, not both: got {ray_bias!r} and {offset!r}")
+
+
+def check_first(
+    mesh: Mesh, scene: RayScene, normals: Float[np.ndarray, "v 3"], start: Origins
+) -> None:
+    """Raise `ValueError` where the scene's first mesh is not the one that light bounces off.
+
+    Rays from some vertices, back to the surface and away from it, must meet the first mesh where
+    this one has the face that they name.
+    """
+    faces, points = np.asarray(mesh.faces), np.asarray(mesh.vertices, np.float64)
+    some = np.flatnonzero(normals.any(axis=1))
+    some = some[:: -(-len(some) // _PROBED) or 1]
+    origins, away = np.tile(start.positions[some], (2, 1)), normals[some]
+    directions = np.concatenate([-away, away])
+    if not len(some):
+        return
+    hit = scene.closest_hit(origins, directions)
+    first = np.flatnonzero(hit.mesh == 0)
+    known = first[hit.face[first] < len(faces)]
+    corners = points[faces[hit.face[known]]]
+    place = np.einsum("nij,ni->nj", corners, hit.barycentric[known].astype(np.float64))
+    met = origins[known] + hit.distance[known, None] * directions[known]
+    far = np.linalg.norm(place - met, axis=1) > 1e-3 * np.ptp(points, axis=0).max()
+    if wrong := len(first) - len(known) + far.sum():
+        raise ValueError(
+            "expected a scene whose first mesh is the baked one, since light bounces off it, but "
+            f"{wrong} of {len(first)} rays met its first mesh where the baked one has no such face"
+        )
 
 
 def faults(

@@ -89,11 +89,6 @@ def bounced(
     rays = _rays(receivers.origins[rows], vectors, cosines > 0)
     hit = scene.closest_hit(rays.origins, rays.directions)
     met = np.flatnonzero(hit.mesh == 0)
-    if (last := hit.face[met].max(initial=-1)) >= len(surface.faces):
-        raise ValueError(
-            f"expected a scene whose first mesh is the baked one, of {len(surface.faces)} faces, "
-            f"but rays met its face {last}"
-        )
     met = met[np.einsum("ij,ij->i", surface.outward[hit.face[met]], rays.directions[met]) < 0]
 
     weights = cosines.reshape(-1)[rays.flat[met]] * (4 * math.pi / len(vectors))
