@@ -67,7 +67,7 @@ def rounded_once(function, *arguments):
     return jax.lax.optimization_barrier(materialize(function, *arguments))
 
 
-def in_turn(function, tree, *, most: int | None = None, lapack: bool = False):
+def in_turn(function, tree, *, most: int | None = None, lapack: bool = False) -> Any:
     """`function` of each row of a tree of arrays: one after the other on one CPU, else all at once.
 
     For rows that are large themselves, where a batch would only leave the cache. `most` is the
