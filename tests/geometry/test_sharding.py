@@ -33,6 +33,7 @@ def test_trace_keeps_the_sharding_of_rays(scene, rng):
     check_sharded(cast, arguments, specs, (ROWS, ROWS, ROWS), exchange=STEPS)
 
 
+@pytest.mark.slow
 def test_rays_of_the_sun_keep_the_sharding_of_their_origins(scene, rng):
     origins = rng.normal(size=(64, 3)).astype(np.float32)
 
@@ -90,6 +91,7 @@ def test_normals_of_shared_vertices_are_refused():
         geometry.vertex_normals(vertices, knot.faces)
 
 
+@pytest.mark.slow
 def test_what_runs_on_the_host_takes_shared_arrays(scene, rng):
     """Ray scenes, neighbors and topology are NumPy: they read the whole of what is shared out."""
     knot = geometry.knot(300)

@@ -109,14 +109,10 @@ def hessians(points, degree):
     return jax.vmap(jax.hessian(lambda s: harmonics.evaluate(s, degree)))(points)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "order",
-    [
-        "fwd-rev",
-        pytest.param("rev-rev", marks=pytest.mark.slow),
-        pytest.param("fwd-fwd", marks=pytest.mark.slow),
-        pytest.param("rev-fwd", marks=pytest.mark.slow),
-    ],
+    ["fwd-rev", "rev-rev", "fwd-fwd", "rev-fwd"],
 )
 def test_second_derivatives_in_every_mode(order):
     degree, modes = 4, {"fwd": jax.jacfwd, "rev": jax.jacrev}

@@ -180,6 +180,7 @@ def dering_of_glossy(c, exponent):
     return harmonics.dering(c, of="glossy", exponent=exponent)
 
 
+@pytest.mark.slow
 def test_dering_of_glossy_light_by_exponent(rng):
     """Enough for the lobe and no more; the sharper the lobe, the more; the light itself most."""
     c = lights(rng, 3)[:16]

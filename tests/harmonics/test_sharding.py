@@ -40,6 +40,7 @@ def test_the_basis_where_the_second_axis_is_sharded(rng):
     check_sharded(everything, (directions,), (SECOND,), out)
 
 
+@pytest.mark.slow
 def test_rotations(rng):
     def of_functions(f, rotations, angles):
         turned = harmonics.rotate(f, rotations), harmonics.rotate(f, jnp.eye(3))

@@ -44,6 +44,7 @@ def test_sphere_is_the_integral_over_its_cap(rng, degree):
     assert gradient.shape == (3, 3, (degree + 1) ** 2, 3)
 
 
+@pytest.mark.slow
 def test_sphere_s_gradient_is_its_derivative(rng):
     sphere = Sphere(rng.normal(size=3), 0.7, RADIANCE)
     point = sphere.center + jnp.asarray([0.5, 0.6, -0.8])

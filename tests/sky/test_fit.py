@@ -37,6 +37,7 @@ def exact(sun, haze):
     return sky.project(haze_sky, sun, haze, degree=DEGREE, symmetric=True)
 
 
+@pytest.mark.slow
 def test_between_the_samples(fitted, rng):
     sun, haze = upper_directions(rng, 20), rng.uniform(1, 3, 20)
     assert relative_error(fitted(sun, haze), exact(sun, haze)) < 1e-7

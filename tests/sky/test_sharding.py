@@ -31,6 +31,7 @@ def hosek_tables(rng, monkeypatch):
     monkeypatch.setattr(_hosek, "_tables", lambda: tables)
 
 
+@pytest.mark.slow
 def test_radiance(sky_of, hosek_tables):
     view, sun, turbidity = sky_of
     for model in (
