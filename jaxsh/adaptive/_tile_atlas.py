@@ -140,7 +140,8 @@ class TileFollower:
     threads do it in the background, and 16 on an accelerator, which does one thing after the
     other. Frames meanwhile share the machine with that and are slower, and starting it takes a
     moment of its own. The `keep` sets last used are kept, for an eye that comes back; where the
-    eye will go is known, `prepare` spares the frames all of it.
+    eye will go is known, `prepare` spares the frames all of it. Raises `ValueError` for a `keep`
+    below 2 and for no slice.
 
     **Example**
 

@@ -67,6 +67,8 @@ def load(path: str | os.PathLike[str]) -> Transfer:
     True
     """
     path = as_path(path)
+    if path.is_dir():
+        raise FileNotFoundError(f"{path}: a folder, not a transfer file: open reads stores")
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such transfer file")
     if not zipfile.is_zipfile(path):

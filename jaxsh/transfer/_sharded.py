@@ -38,9 +38,11 @@ def shard_rows(
 
     >>> import jax
     >>> import numpy as np
-    >>> from jaxsh import transfer
-    >>> albedo = np.full((5, 3), 0.5, np.float32)
-    >>> transfer.shard_rows(albedo, jax.devices()[:1]).shape
+    >>> from jaxsh import sphere, transfer
+    >>> points, devices = sphere.fibonacci(5).directions, jax.devices()[:1]
+    >>> shared = transfer.unshadowed(points, points, degree=1).sharded(devices)
+    >>> albedo = transfer.shard_rows(np.full((5, 3), 0.5, np.float32), devices)
+    >>> transfer.shade_diffuse(np.ones((3, 4), np.float32), shared, albedo).shape
     (5, 3)
     """
     check_known("values", values)

@@ -31,7 +31,7 @@ class StoredTransfer:
 
     Made by `open`. `shade_diffuse` and `shade_glossy` take it as they take a `Transfer`, and go
     through its blocks, the next of which is read while one is shaded; `blocks` does so for any
-    other purpose, and `load` reads all.
+    other purpose. All other functions take the `Transfer` that `load` gives, or `sharded`.
 
     **Example**
 
@@ -64,6 +64,17 @@ class StoredTransfer:
         Each is a `Transfer` of those vertices alone, on one of this process's devices in turn; its
         neighbors are numbered within the block, and one in another block is the vertex itself.
         Raises `ValueError` for a block that is missing or damaged.
+
+        **Example**
+
+        >>> import pathlib, tempfile
+        >>> from jaxsh import geometry, transfer
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder) / "knot.zarr"
+        ...     baked = transfer.bake(geometry.knot(300), degree=1, shadows=False, store=path)
+        ...     counts = [part.num_points for _, part in transfer.open(path).blocks()]
+        >>> counts
+        [64, 64, 64, 64, 44]
         """
 
         def give(
@@ -215,6 +226,8 @@ def open(path: str | os.PathLike[str]) -> StoredTransfer:
     path = as_path(path).absolute()
     if not path.exists():
         raise FileNotFoundError(f"{path}: there is no such transfer store")
+    if path.is_file():
+        raise ValueError(f"{path}: not a transfer store, which is a folder: load reads files")
     store = BlockStore(path, read_only=True)
     store.check_rows(*_ARRAYS)
     for name in _ARRAYS:

@@ -52,6 +52,11 @@ def test_a_file_is_replaced_only_by_a_whole_one(tmp_path, monkeypatch):
     assert [file.name for file in tmp_path.iterdir()] == ["a"]
 
 
+def test_a_folder_is_no_file(tmp_path):
+    with pytest.raises(FileNotFoundError, match="a folder, not a transfer file: open reads stores"):
+        load(tmp_path)
+
+
 def test_a_truncated_file_is_refused_at_every_length(tmp_path, whole):
     path = tmp_path / "short"
     for length in [*range(0, len(whole), 13), len(whole) - 1]:

@@ -101,8 +101,8 @@ def bake(
 
     Raises `ValueError` for arguments and values out of range, and for the store of another bake or
     another thing, which is left as it is; `OSError` where the store cannot be written. Runs outside
-    `jit`, what is done once for the mesh in NumPy, and does not shard: give the result's arrays to
-    `jax.device_put`. Not differentiable: visibility is a step.
+    `jit`, what is done once for the mesh in NumPy, and does not shard: `Transfer.sharded` shares
+    the result out. Not differentiable: visibility is a step.
 
     **Example**
 

@@ -69,9 +69,9 @@ def bake_on(
     - all others: as for `bake`. There is no `scene`: the mesh alone stops rays.
 
     **Returns** the `StoredTransfer` that `transfer.open` gives. Nothing of the size of its
-    coefficients is ever in the memory of this process. A worker process holds the mesh's tree,
-    about 0.2 KB a vertex, and for bounces the coefficients before them: give a machine one process
-    of many threads rather than many of one.
+    coefficients is ever in the memory of this process. A worker process holds the mesh's tree, up
+    to 0.25 KB a vertex (experiment `scale`), and for bounces the coefficients before them: give a
+    machine one process of many threads rather than many of one.
 
     Workers need this version of jaxsh. Where there are none, the call waits for some. A block
     fails for good where four workers died of it, as of too little memory. One `UserWarning` counts
