@@ -191,8 +191,8 @@ def _with_palette(image):
 
     if image.mode == "L":
         return image
-    # Until fewer pixels than this change their color: twice as fast as until none does, and the
-    # error is larger by a hundredth of itself.
+    # Until fewer pixels than this change their color: until none does takes several times as long,
+    # for an error that is little smaller.
     settled = image.width * image.height // 50
     return image.quantize(256, method=Image.Quantize.MEDIANCUT, kmeans=max(settled, 1))
 
