@@ -111,6 +111,7 @@ def test_a_worker_s_trouble_is_the_caller_s(tmp_path, client, monkeypatch):
         with pytest.raises(OSError, match="No space left on device"):
             bake_on(client, MESH, DEGREE, store=path, **ALIKE)
     assert not client.futures
+    assert not _worker._held
     assert 4 in BakeStore(path).missing()
     bake_on(client, MESH, DEGREE, store=path, **ALIKE)
     np.testing.assert_array_equal(rows(path), bake(MESH, DEGREE, **ALIKE).coefficients)

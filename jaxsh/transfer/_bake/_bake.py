@@ -143,21 +143,22 @@ def bake(
             return []
         return why_blind(mesh, caster, blind, normals, start)
 
-    job = job_of(mesh, arguments, caster, Prepared(normals, positions))
-    kept = None if path is None else BakeStore.of(path, mesh, job, identity)
-    with progress_bar(job.passes * len(normals), progress) as bar:
+    prepared = Prepared(normals, positions)
+    job = job_of(mesh, arguments, caster, prepared)
+    kept = None if path is None else BakeStore.of(path, mesh, arguments, prepared, identity)
+    with progress_bar(arguments.passes * len(normals), progress) as bar:
         passes = Passes(job, chunk, kept, bar)
         run: Callable[..., Any] = passes.run
         if kept is None and isinstance(job, DeviceJob):
             run = functools.partial(job.whole, bar)
         if kept is not None and kept.finished:
             said = kept.attributes["warning"]
-            coefficients = run(job.passes - 1)
+            coefficients = run(arguments.passes - 1)
         else:
             coefficients = direct = run(0)
             blind = ~np.asarray(direct.any(axis=1)) & normals.any(axis=1)
             said = faults(mesh, normals, np.flatnonzero(blind), why)
-            for bounce in range(1, job.passes):
+            for bounce in range(1, arguments.passes):
                 coefficients = run(bounce, coefficients, direct)
             if kept is not None:
                 kept.finish(said)

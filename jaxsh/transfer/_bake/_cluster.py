@@ -5,7 +5,7 @@ import itertools
 import os
 import uuid
 import warnings
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..._core.words import reason
 from ...geometry import Mesh
 from .._stored import StoredTransfer, open
 from ._blind import why_blind
-from ._device import job_of, scene_for
+from ._device import scene_for
 from ._faults import checked, faults
 from ._job import Prepared
 from ._kept import BakeStore, refuse
@@ -124,8 +124,7 @@ def bake_on(
             return why_blind(mesh, scene_for(mesh, arguments.device), blind, normals, start)
 
         positions = np.asarray(mesh.vertices) if start is None else start.positions
-        job = job_of(mesh, arguments, None, Prepared(normals, positions))
-        kept = BakeStore.of(path, mesh, job, identity)
+        kept = BakeStore.of(path, mesh, arguments, Prepared(normals, positions), identity)
         if not kept.finished:
             blind = _fill(connected, kept, identity, chunk, progress)
             kept.finish(faults(mesh, normals, blind, why))
@@ -174,21 +173,35 @@ def _fill(
 ) -> Int[np.ndarray, " n"]:
     """Fill all passes of a store; gives the vertices that have a normal and see nothing."""
     blind = np.zeros(kept.num_points, bool)
-    with progress_bar(kept.passes * kept.num_points, progress) as bar:
+    with progress_bar(kept.passes * kept.num_points, progress) as bar, _letting_go(client):
         for number in range(kept.passes):
             task = Task(str(kept.path), identity, number, chunk)
-            for block, found in _answers(client, task, kept.num_blocks):
-                part = kept.rows(block)
-                count = part.stop - part.start
-                if found is not None:
-                    blind[part] = np.unpackbits(np.frombuffer(found, np.uint8), count=count)
-                bar.update(count)
-    with contextlib.suppress(OSError):
-        client.run(let_go, on_error="ignore")
+            with contextlib.closing(_answers(client, task, kept.num_blocks)) as answers:
+                for block, found in answers:
+                    part = kept.rows(block)
+                    count = part.stop - part.start
+                    if found is not None:
+                        blind[part] = np.unpackbits(np.frombuffer(found, np.uint8), count=count)
+                    bar.update(count)
     return np.flatnonzero(blind)
 
 
-def _answers(client: Any, task: Task, blocks: int) -> Iterator[tuple[int, bytes | None]]:
+@contextlib.contextmanager
+def _letting_go(client: Any) -> Iterator[None]:
+    """Have workers free what they keep of a bake, however it ends."""
+    reached = True
+    try:
+        yield
+    except ConnectionError:  # to try would wait for the scheduler
+        reached = False
+        raise
+    finally:
+        if reached:
+            with contextlib.suppress(OSError):
+                client.run(let_go, on_error="ignore")
+
+
+def _answers(client: Any, task: Task, blocks: int) -> Generator[tuple[int, bytes | None]]:
     """Run a task for each block and yield blocks and answers as they come."""
     from concurrent.futures import CancelledError
 

@@ -31,6 +31,11 @@ class BakeArguments:
     scene: bool = False  # whether one was given
     device: bool = False  # whether rays are cast on the default device
 
+    @property
+    def passes(self) -> int:
+        """Count the passes over the vertices: the direct light's, and one a bounce."""
+        return 1 + self.bounces
+
     def identity(self, mesh: Mesh) -> dict[str, Any]:
         """Give what tells this bake from others, for a store's attributes (JSON)."""
         plain = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
@@ -72,9 +77,9 @@ class Job:
     ):
         self.arguments, self.scene, self.prepared = arguments, scene, prepared
         self.num_points, self.width = len(prepared.normals), num_coefficients(arguments.degree)
+        self.dtype = prepared.normals.dtype
         self._receivers = Receivers(prepared.origins, prepared.normals)
         with jax.enable_x64(True):
-            self.dtype = unshadowed(prepared.normals[:1], arguments.degree).dtype
             if arguments.shadows:
                 self._lights = guided(
                     arguments.directions, arguments.degree, arguments.seed, self.dtype
@@ -84,11 +89,6 @@ class Job:
                 self._vectors = turned_fibonacci(arguments.directions, arguments.seed, self.dtype)
                 self._surface = surface(mesh)
                 self._share = np.ravel(self.arguments.albedo).astype(self.dtype) / math.pi
-
-    @property
-    def passes(self) -> int:
-        """Count the passes over the vertices: the direct light's, and one a bounce."""
-        return 1 + self.arguments.bounces
 
     def rows(
         self,

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from ... import geometry
 from ..._core.words import reason
 from ...geometry import Mesh, RayScene
+from ...harmonics import num_coefficients
 from .._store import BlockStore, DamagedError, block_rows, make, sweep
 from ._device import job_of, scene_for
 from ._job import BakeArguments, Job, Prepared
@@ -26,25 +27,32 @@ class BakeStore(BlockStore):
     """
 
     @staticmethod
-    def of(path: Path, mesh: Mesh, job: Job, identity: dict[str, Any]) -> "BakeStore":
-        """Make the store of a job, or mend the one that is there, but for its passes.
+    def of(
+        path: Path,
+        mesh: Mesh,
+        arguments: BakeArguments,
+        prepared: Prepared,
+        identity: dict[str, Any],
+    ) -> "BakeStore":
+        """Make the store of a bake, or mend the one that is there, but for its passes.
 
-        `identity` is that of the job's arguments. Raises what `refuse` does.
+        `identity` is that of the arguments. Raises what `refuse` does.
         """
         arrays = {
             "positions": np.asarray(mesh.vertices),
             "normals": np.asarray(mesh.normals),
             "faces": np.asarray(mesh.faces),
-            "unit_normals": job.prepared.normals,
-            "origins": job.prepared.origins,
-            "albedo": np.atleast_1d(job.arguments.albedo).astype(np.float64),
+            "unit_normals": prepared.normals,
+            "origins": prepared.origins,
+            "albedo": np.atleast_1d(arguments.albedo).astype(np.float64),
         }
-        names = [_name(number, job.passes) for number in range(job.passes)]
-        later = {name: ((job.num_points, job.width), job.dtype) for name in names}
+        names = [_name(number, arguments.passes) for number in range(arguments.passes)]
+        shape = len(prepared.normals), num_coefficients(arguments.degree)
+        later = dict.fromkeys(names, (shape, prepared.normals.dtype))
         if not _stands(path):
             arrays["neighbors"] = np.asarray(geometry.neighbors(mesh))
-            about = {"degree": job.arguments.degree, "arguments": identity}
-            if make(path, arrays, later, block_rows(job.num_points), about):
+            about = {"degree": arguments.degree, "arguments": identity}
+            if make(path, arrays, later, block_rows(shape[0]), about):
                 return BakeStore(path)
         refuse(path, identity)
         store = BakeStore(path)

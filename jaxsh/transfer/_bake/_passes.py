@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import sys
+from collections import deque
 from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -86,9 +87,9 @@ def _in_order(
 ) -> Generator[tuple[slice, np.ndarray]]:
     """Yield each part with its rows. After an exception or interrupt later parts do not start."""
     with ThreadPoolExecutor(threads) as pool:
-        futures = [pool.submit(gather, part) for part in parts]
+        futures = deque(pool.submit(gather, part) for part in parts)
         try:
-            for part, future in zip(parts, futures, strict=True):
-                yield part, future.result()
+            for part in parts:
+                yield part, futures.popleft().result()  # which is then kept nowhere
         finally:
             pool.shutdown(wait=False, cancel_futures=True)

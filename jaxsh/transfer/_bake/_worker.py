@@ -97,8 +97,8 @@ def _hold(path: str, identity: dict[str, Any]) -> _Held:
 def _keep_freed_memory() -> None:
     """Let glibc keep memory that is freed, for the next block.
 
-    Dask's nanny tells it to give all back at once, which takes a fifth of a bake's processor time:
-    each array of a block then comes from the system anew, page by page.
+    Dask's nanny tells it to give all back at once: each array of a block then comes from the system
+    anew, page by page, and much of a bake's processor time goes there.
     """
     if "MALLOC_TRIM_THRESHOLD_" in os.environ:
         with contextlib.suppress(AttributeError, OSError):  # another C library
@@ -108,6 +108,11 @@ def _keep_freed_memory() -> None:
 
 
 def let_go() -> None:
-    """Free what this process keeps of a bake."""
-    with _building:
+    """Free what this process keeps of a bake.
+
+    But what is being built, as is where a bake is stopped at its start: the next bake frees that.
+    To wait for it would keep the worker from answering its scheduler.
+    """
+    if _building.acquire(blocking=False):
         _held.clear()
+        _building.release()
