@@ -3,15 +3,10 @@
 import dataclasses
 import functools
 import os
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 from pathlib import Path
-from queue import SimpleQueue
-from typing import TypeVar
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
@@ -19,10 +14,10 @@ from .._core.checks import as_path
 from .._core.devices import Devices, last_of, mesh_of, own_numbers, place
 from ..harmonics import degree_of
 from ._store import BlockStore
+from ._store_stream import stream
 from ._transfer import Transfer
 
 _ARRAYS = "coefficients", "positions", "normals", "neighbors"
-_Result = TypeVar("_Result")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,10 +75,9 @@ class StoredTransfer:
         def give(
             rows: slice, coefficients: Array, positions: Array, normals: Array, neighbors: Array
         ) -> tuple[slice, Transfer]:
-            made = Transfer(coefficients, positions, normals, neighbors)
-            return rows, made
+            return rows, Transfer(coefficients, positions, normals, neighbors)
 
-        yield from self._stream(_ARRAYS, give, keep=True)
+        yield from stream(self._store, _ARRAYS, give, keep=True)
 
     def load(self) -> Transfer:
         """Read the whole transfer into memory; raises `ValueError` for a damaged block."""
@@ -114,90 +108,6 @@ class StoredTransfer:
             for name in _ARRAYS
         )
         return Transfer(coefficients, positions, normals, neighbors)
-
-    def shaded(
-        self, arrays: Sequence[str], shade: Callable[[slice, Transfer], Array]
-    ) -> np.ndarray:
-        """Put together the colors (..., V, 3) that a function gives for each block.
-
-        Only `arrays` are read; the others of the transfers are zero.
-        """
-        colors = None
-
-        @functools.cache
-        def zeros(rows: int) -> tuple[Array, Array]:
-            return jnp.zeros((rows, 3), self.dtype), jnp.zeros((rows, 0), jnp.int32)
-
-        def give(rows: slice, *read: Array) -> tuple[slice, Array]:
-            held = dict(zip(arrays, read, strict=True))
-            left, neighbors = zeros(len(read[0]))
-            positions, normals = held.get("positions", left), held.get("normals", left)
-            return rows, shade(rows, Transfer(held["coefficients"], positions, normals, neighbors))
-
-        for rows, part in self._stream(arrays, give, keep=False):
-            if colors is None:
-                colors = np.empty((*part.shape[:-2], self.num_points, 3), part.dtype)
-            colors[..., rows, :] = part
-        assert colors is not None
-        return colors
-
-    def _stream(
-        self,
-        arrays: Sequence[str],
-        use: Callable[..., tuple[slice, _Result]],
-        *,
-        keep: bool,
-    ) -> Iterator[tuple[slice, _Result]]:
-        """Give what a function makes of each block's arrays, in order.
-
-        Of each device's blocks one is used while the next is read: no third is in memory. Unless
-        results `keep` what they are made of, its memory is used again.
-        """
-        devices, store = jax.local_devices(), self._store
-        count, ahead = store.num_blocks, len(devices)
-        rooms: SimpleQueue[list[np.ndarray | None]] = SimpleQueue()
-        for _ in range(2 * ahead):
-            rooms.put([None if keep else store.room(name) for name in arrays])
-
-        def read(block: int) -> tuple[list[np.ndarray | None], list[np.ndarray]]:
-            room = rooms.get()
-            parts = [
-                self._local(name, store.rows(block), store.read(name, block, part))
-                for name, part in zip(arrays, room, strict=True)
-            ]
-            return room, parts
-
-        with ThreadPoolExecutor(ahead) as pool:
-            reading = deque(pool.submit(read, block) for block in range(min(ahead, count)))
-            used: deque[tuple[list[np.ndarray | None], tuple[slice, _Result]]] = deque()
-
-            def done() -> tuple[slice, _Result]:
-                room, result = used.popleft()
-                jax.block_until_ready(result)
-                rooms.put(room)
-                return result
-
-            try:
-                for block in range(count):
-                    room, host = reading.popleft().result()
-                    if len(used) == ahead:
-                        yield done()
-                    if block + ahead < count:
-                        reading.append(pool.submit(read, block + ahead))
-                    here = jax.device_put(host, devices[block % ahead])
-                    used.append((room, use(store.rows(block), *here)))
-                    del host, here
-                while used:
-                    yield done()
-            finally:
-                pool.shutdown(wait=True, cancel_futures=True)
-
-    def _local(self, name: str, rows: slice, values: np.ndarray) -> np.ndarray:
-        if name == "neighbors":
-            own = np.arange(len(values), dtype=values.dtype)[:, None]
-            values = values - values.dtype.type(rows.start)
-            return np.where((values >= 0) & (values < len(values)), values, own)
-        return values.astype(jax.dtypes.canonicalize_dtype(values.dtype), copy=False)
 
 
 def open(path: str | os.PathLike[str]) -> StoredTransfer:

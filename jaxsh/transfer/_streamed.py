@@ -1,12 +1,15 @@
 """Shading of a transfer on disk, block by block."""
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Sequence
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from .._core.checks import check_known
 from ._material import Material
+from ._store_stream import stream
 from ._stored import StoredTransfer
 from ._transfer import Transfer
 
@@ -23,7 +26,7 @@ def streamed_diffuse(
     def of(rows: slice, block: Transfer) -> Array:
         return shade(_own(lights, rows), block, albedos[rows] if albedos.ndim == 2 else albedos)
 
-    return transfer.shaded(("coefficients",), of)
+    return _shaded(transfer, ("coefficients",), of)
 
 
 def streamed_glossy(
@@ -47,7 +50,34 @@ def streamed_glossy(
         )
         return shade(_own(lights, rows), block, place, own)
 
-    return transfer.shaded(("coefficients", "positions", "normals"), of)
+    return _shaded(transfer, ("coefficients", "positions", "normals"), of)
+
+
+def _shaded(
+    transfer: StoredTransfer, arrays: Sequence[str], shade: Callable[[slice, Transfer], Array]
+) -> np.ndarray:
+    """Put together the colors (..., V, 3) that a function gives for each block.
+
+    Only `arrays` are read; the others of the transfers are zero.
+    """
+    colors = None
+
+    @functools.cache
+    def zeros(rows: int) -> tuple[Array, Array]:
+        return jnp.zeros((rows, 3), transfer.dtype), jnp.zeros((rows, 0), jnp.int32)
+
+    def give(rows: slice, *read: Array) -> tuple[slice, Array]:
+        held = dict(zip(arrays, read, strict=True))
+        left, neighbors = zeros(len(read[0]))
+        positions, normals = held.get("positions", left), held.get("normals", left)
+        return rows, shade(rows, Transfer(held["coefficients"], positions, normals, neighbors))
+
+    for rows, part in stream(transfer._store, arrays, give, keep=False):
+        if colors is None:
+            colors = np.empty((*part.shape[:-2], transfer.num_points, 3), part.dtype)
+        colors[..., rows, :] = part
+    assert colors is not None
+    return colors
 
 
 def _on_host(name: str, array: Array) -> np.ndarray:
