@@ -12,10 +12,7 @@ attributes once an array is complete.
 import contextlib
 import functools
 import math
-import os
 import shutil
-import socket
-import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -24,24 +21,14 @@ import numpy as np
 
 from .._core.host import aligned
 from .._core.words import reason
-from ._store_layout import FORMAT, VERSION, checked, make_array, open_group
+from ._store_files import SUM, put_beside, sum_of, written
+from ._store_layout import checked, make_array, open_group
 
-# Rows of a block: about a hundredth of the mesh, so that little is lost when a bake is stopped, and
-# a power of two, so that it is whole tiles of the bake. With more a task of a cluster would take
-# too long, with fewer the opening of files would show.
-_PARTS, _FEWEST, _MOST = 128, 64, 32_768
-_SUM = 4  # bytes of a chunk's checksum
 _SUMS = "sums"  # attribute: 8 hexadecimal digits a block, by array; also a folder in an array's
 
 
 class DamagedError(ValueError):
     """Says which chunk of a store is missing or damaged."""
-
-
-def block_rows(count: int) -> int:
-    """Choose how many vertices of `count` a block holds: nothing else may decide it."""
-    wanted = 1 << max(-(-count // _PARTS) - 1, 0).bit_length()
-    return min(max(wanted, _FEWEST), _MOST)
 
 
 class BlockStore:
@@ -113,7 +100,7 @@ class BlockStore:
             problem = f"not readable ({reason(error)})"
             raise DamagedError(self._problem(file, problem)) from error
         data.setflags(write=False)
-        numbers, expected = data[:-_SUM], data[-_SUM:]
+        numbers, expected = data[:-SUM], data[-SUM:]
         if not whole or crc32c(numbers) != int.from_bytes(expected, "little"):
             raise DamagedError(self._problem(file, "damaged"))
         if not self._known(name, block, expected.tobytes()):
@@ -144,9 +131,9 @@ class BlockStore:
 
         After a power cut a file may be there without its bytes, which its checksum tells.
         """
-        written = self._write(name, block, values)
-        with _written(self._file(name, block)):
-            _put_beside(self._sum_file(name, block), written)
+        checksum = self._write(name, block, values)
+        with written(self._file(name, block)):
+            put_beside(self._sum_file(name, block), checksum)
 
     def put(self, **arrays: np.ndarray) -> None:
         """Write complete arrays, but the blocks that are there and right already."""
@@ -166,7 +153,7 @@ class BlockStore:
 
         Raises `ValueError` where one is of another shape or dtype.
         """
-        with _written(self.path):
+        with written(self.path):
             for name, (shape, dtype) in later.items():
                 if name not in self._group:
                     make_array(self._group, name, shape, dtype, self.block_rows)
@@ -200,7 +187,7 @@ class BlockStore:
             for block in range(_blocks(self._array(name))):
                 file = self._file(name, block)
                 try:
-                    found.append(_sum_of(file))
+                    found.append(sum_of(file))
                 except OSError:
                     raise DamagedError(self._problem(file, "missing")) from None
                 if not self._known(name, block, found[-1]):
@@ -241,26 +228,26 @@ class BlockStore:
     def _complete(self, name: str, block: int) -> bytes:
         try:
             digits = _sums_in(self.attributes)[name]
-            return bytes.fromhex(digits[2 * _SUM * block : 2 * _SUM * (block + 1)])
+            return bytes.fromhex(digits[2 * SUM * block : 2 * SUM * (block + 1)])
         except (KeyError, TypeError, ValueError):  # not complete yet, or damaged
             return b""
 
     def _record(self, sums: dict[str, str], values: dict[str, Any]) -> None:
         _, now = open_group(self.path, "r")  # another process may have been here meanwhile
         values = values | {_SUMS: _sums_in(now) | sums}
-        with _written(self.path):
+        with written(self.path):
             self._group.attrs.update(values)
         self.attributes = now | values
 
     def _write(self, name: str, block: int, values: np.ndarray) -> bytes:
         array, file = self._array(name), self._file(name, block)
         part = slice(block * array.chunks[0], block * array.chunks[0] + len(values))
-        with _written(file):
+        with written(file):
             try:
                 array[part] = values
             except FileNotFoundError:  # another process finished, and dropped what is half written
                 array[part] = values
-            return _sum_of(file)
+            return sum_of(file)
 
     def _sum_file(self, name: str, block: int) -> Path:
         return self.path.joinpath(name, _SUMS, str(block))
@@ -278,103 +265,9 @@ class BlockStore:
         return f"{self.path}: {file.relative_to(self.path)} is {what}: bake into it again"
 
 
-def make(
-    path: Path,
-    arrays: dict[str, np.ndarray],
-    later: dict[str, tuple[tuple[int, ...], np.dtype]],
-    rows: int,
-    attributes: dict[str, Any],
-) -> bool:
-    """Write a store, which is put in its place complete, unless another process was faster.
-
-    Of the arrays `later` only shapes and dtypes are known yet. Returns whether this is the store
-    that is there now. Raises `OSError` where it cannot be written.
-    """
-    import zarr
-
-    path = path.resolve()  # a link stays one
-    sweep(path)
-    by = f"{socket.gethostname()}-{os.getpid()}-{uuid.uuid4().hex}"
-    temporary = path.with_name(f".{path.name}.{by}.partial")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        group = zarr.create_group(temporary, overwrite=True)
-        for name, array in arrays.items():
-            make_array(group, name, array.shape, array.dtype, rows)
-        for name, (shape, dtype) in later.items():
-            make_array(group, name, shape, dtype, rows)
-        group.attrs.update({"format": FORMAT, "version": VERSION} | attributes)
-        store = BlockStore(temporary)
-        store.put(**arrays)
-        try:
-            temporary.replace(path)
-        except OSError:
-            if not (path / "zarr.json").exists():
-                raise
-            return False
-    except OSError as error:
-        first = error.__cause__ if isinstance(error.__cause__, OSError) else error
-        raise _like(first, f"{path}: cannot be written: {reason(first)}") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-    return True
-
-
-def sweep(path: Path) -> None:
-    """Delete what processes of this machine that were killed in `make` have left beside a path."""
-    path, found = path.resolve(), []
-    start = f".{path.name}.{socket.gethostname()}-"
-    if os.name == "posix":
-        with contextlib.suppress(OSError):
-            found = [left for left in path.parent.iterdir() if left.name.startswith(start)]
-    for left in found:
-        try:
-            os.kill(int(left.name[len(start) :].partition("-")[0]), 0)  # asks whether it lives
-        except ProcessLookupError:
-            shutil.rmtree(left, ignore_errors=True)
-        except (OSError, ValueError, OverflowError):
-            pass
-
-
-@contextlib.contextmanager
-def _written(path: Path) -> Iterator[None]:
-    """Say what could not be written."""
-    try:
-        yield
-    except OSError as error:
-        raise _like(
-            error,
-            f"{path}: cannot be written: {reason(error)}; the blocks that are finished are kept, "
-            "and the same call goes on from them",
-        ) from error
-
-
 def _sums_in(attributes: dict[str, Any]) -> dict[str, Any]:
     sums = attributes.get(_SUMS)
     return sums if isinstance(sums, dict) else {}
-
-
-def _sum_of(file: Path) -> bytes:
-    """Read the checksum at the end of a chunk's file."""
-    with file.open("rb") as opened:
-        opened.seek(-_SUM, os.SEEK_END)
-        return opened.read()
-
-
-def _put_beside(file: Path, content: bytes) -> None:
-    """Write a small file into a folder that another process may delete at any time."""
-    for last in (False, True):
-        try:
-            file.parent.mkdir(exist_ok=True)
-            file.write_bytes(content)
-            return
-        except FileNotFoundError:
-            if last:
-                raise
-
-
-def _like(error: OSError, said: str) -> OSError:
-    return OSError(said) if error.errno is None else OSError(error.errno, said)
 
 
 def _blocks(array: Any) -> int:
@@ -383,4 +276,4 @@ def _blocks(array: Any) -> int:
 
 def _bytes(array: Any) -> int:
     """Give the size of a chunk's file; the last chunk is filled up."""
-    return math.prod(array.chunks) * array.dtype.itemsize + _SUM
+    return math.prod(array.chunks) * array.dtype.itemsize + SUM

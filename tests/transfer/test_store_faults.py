@@ -19,7 +19,7 @@ from jaxsh.transfer import bake, shade_diffuse
 from jaxsh.transfer import open as open_store
 from jaxsh.transfer._bake import _kept, _passes
 from jaxsh.transfer._bake._kept import BakeStore
-from jaxsh.transfer._store import sweep
+from jaxsh.transfer._store_make import sweep
 
 OPTIONS = {"directions": 128, "bounces": 1, "progress": False}
 

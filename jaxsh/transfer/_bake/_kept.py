@@ -12,7 +12,8 @@ from ... import geometry
 from ..._core.words import reason
 from ...geometry import Mesh, RayScene
 from ...harmonics import num_coefficients
-from .._store import BlockStore, DamagedError, block_rows, make, sweep
+from .._store import BlockStore, DamagedError
+from .._store_make import block_rows, make, sweep
 from ._device import job_of, scene_for
 from ._job import BakeArguments, Job, Prepared
 
