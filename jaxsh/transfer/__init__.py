@@ -8,20 +8,14 @@ from ._bake import bake, bake_on
 from ._file import load, save
 from ._fixed_light import FixedLight, fixed_light
 from ._fixed_view import FixedView, fixed_view
+from ._forms import QuantizedTransfer, SampledTransfer, quantize, sample
 from ._material import Material
 from ._shade import reflected_direction, shade_diffuse, shade_glossy
 from ._sharded import shard_rows
 from ._stored import StoredTransfer, open
 from ._sun import shade_sun
 from ._sun_visibility import SunVisibility, sun_visibility
-from ._transfer import (
-    AbstractTransfer,
-    QuantizedTransfer,
-    SampledTransfer,
-    Transfer,
-    quantize,
-    sample,
-)
+from ._transfer import AbstractTransfer, Transfer
 from ._unshadowed import unshadowed
 
 __all__ = [

@@ -27,8 +27,9 @@ from ._bake._directions import spread
 from ._bake._faults import check_rays
 from ._bake._origins import origins
 from ._bake._receivers import unit_normals
+from ._forms import SampledTransfer
 from ._glossy_kernels import unit
-from ._transfer import SampledTransfer, Transfer
+from ._transfer import Transfer
 
 Surface = Mesh | Transfer | SampledTransfer
 
