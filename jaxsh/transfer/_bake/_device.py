@@ -31,12 +31,12 @@ def takes_device(device: bool | None, scene: RayScene | None) -> bool:
     ours = scene is None or isinstance(scene, JaxRayScene)
     if device is None:
         return ours and _default_platform() != "cpu"
-    check_flag("device", device)
+    device = check_flag("device", device)
     if device and not ours:
         raise ValueError(
             f"device=True needs a scene whose rays JAX casts, a JaxRayScene, got {described(scene)}"
         )
-    return bool(device)
+    return device
 
 
 def _default_platform() -> str:

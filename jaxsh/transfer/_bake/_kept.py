@@ -83,8 +83,9 @@ class BakeStore(BlockStore):
         )
         if scene is None and arguments.shadows:
             scene = scene_for(self.mesh(), arguments.device, threads)
-            # The tree is built while neither the mesh nor what follows is in memory.
-            scene.occluded(np.zeros(3), np.ones(3))
+            if not arguments.device:
+                # Embree builds its tree while neither the mesh nor what follows is in memory.
+                scene.occluded(np.zeros(3), np.ones(3))
         prepared = Prepared(self.whole("unit_normals"), self.whole("origins"))
         return job_of(self.mesh() if arguments.bounces else None, arguments, scene, prepared)
 
@@ -93,10 +94,6 @@ class BakeStore(BlockStore):
         vertices, faces, normals = map(self.whole, ("positions", "faces", "normals"))
         with jax.enable_x64(True):  # as stored, whatever this process computes in
             return Mesh(jnp.asarray(vertices), jnp.asarray(faces), jnp.asarray(normals))
-
-    def missing_of(self, number: int, *, check: bool = False) -> list[int]:
-        """List the blocks of a pass that are not there in full, as `missing` does."""
-        return self.missing(self._pass(number), check=check)
 
     def read_pass(self, number: int, block: int) -> Float[np.ndarray, "rows k"]:
         """Read one block of a pass; raises `DamagedError` where it is not right."""
