@@ -3,11 +3,11 @@
 No such device is needed: JAX lowers for one that is not here. The table is `tests/lowered`.
 """
 
+import accelerators
 import jax
 import lowered
 import pytest
 import valid_calls
-from accelerators import PLATFORMS, accelerator, check, faults  # noqa: F401
 from lowered.derivative import is_float
 
 # Apart, in files of their own, so that two processes share them.
@@ -40,12 +40,10 @@ def test_more_loops_than_two_trips_have_a_reason(module):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("platform", PLATFORMS)
 @pytest.mark.parametrize("module", sorted(set(lowered.MODULES) - LARGE))
-def test_no_loop_but_those_of_the_table_is_left(module, platform):
-    check(module, platform)
+def test_no_loop_but_those_of_the_table_is_left(module):
+    accelerators.check(module)
 
 
-@pytest.mark.parametrize(("module", "name"), [("harmonics", "evaluate")])
-def test_no_loop_is_left_in_some(module, name):
-    assert not [fault for p in PLATFORMS for fault in faults(module, name, p)]
+def test_no_loop_is_left_in_evaluate():
+    assert accelerators.faults("harmonics", "evaluate") == []

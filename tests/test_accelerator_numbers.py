@@ -4,14 +4,13 @@ Forced onto the CPU: the other branch of each `platform_dependent`, with so litt
 are a few blocks.
 """
 
+import accelerators
 import jax
 import jax.numpy as jnp
 import lowered
 import numpy as np
 import pytest
 from lowered.derivative import is_float, with_gradient
-
-from jaxsh._core import xla
 
 ROWS = 2500  # more than a block on a CPU
 
@@ -38,15 +37,12 @@ def smaller(argument, rng):
     ("module", "name", "room"),
     [call if call in FAST else pytest.param(*call, marks=pytest.mark.slow) for call in CALLS],
 )
-def test_the_accelerators_way_gives_the_same_numbers(module, name, room, rng, monkeypatch):
+def test_the_accelerators_way_gives_the_same_numbers(module, name, room, rng):
     call = lowered.table(module)[name]
     arguments = jax.tree.map(lambda a: smaller(a, rng), call.arguments)
     function = with_gradient(call)
     expected = jax.jit(function)(*arguments)
-    monkeypatch.setattr(jax.lax, "platform_dependent", lambda *a, default, **_: default(*a))
-    monkeypatch.setattr(xla, "_ROOM", room)
-    # A precision that no CPU heeds: what is compiled in here is kept apart from all else.
-    with jax.default_matmul_precision("tensorfloat32"):
+    with accelerators.branches(room):
         found = jax.jit(lambda *arguments: function(*arguments))(*arguments)
     for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
         if is_float(one):

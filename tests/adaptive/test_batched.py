@@ -1,12 +1,12 @@
 """What an accelerator computes at once, a share of the vertices or a few blocks, is the same."""
 
+import accelerators
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxsh import adaptive, sphere, transfer
-from jaxsh._core import xla
 
 V, K = 2500, 9  # more than a block on a CPU
 MATERIAL = transfer.Material(0.5, 0.5, 8.0)
@@ -33,7 +33,7 @@ def method(name, made):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["levels", "two_stage", "anchors"])
-def test_at_once_is_as_block_by_block(name, frame, monkeypatch):
+def test_at_once_is_as_block_by_block(name, frame):
     light, made = frame
     chosen, made = method(name, made)
     eye = jnp.asarray([0.0, -3.0, 1.0])
@@ -48,10 +48,7 @@ def test_at_once_is_as_block_by_block(name, frame, monkeypatch):
 
     expected = both(light)
     assert 0 < float(np.min(expected[1])) < 1
-    monkeypatch.setattr(jax.lax, "platform_dependent", lambda *a, default, **_: default(*a))
-    monkeypatch.setattr(xla, "_ROOM", 2**21)
-    # A precision that no CPU heeds: what is compiled in here is kept apart from all else.
-    with jax.default_matmul_precision("tensorfloat32"):
+    with accelerators.branches(2**21):
         found = both(light)
     for one, other in zip(found, expected, strict=True):
         atol = 1e-14 * float(np.abs(other).max())

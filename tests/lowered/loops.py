@@ -13,7 +13,6 @@ class Program(NamedTuple):
     # Of each loop the trips of those that it stands in and its own; None for what only values tell.
     nests: list[tuple[int | None, ...]]
     callbacks: list[str]
-    largest: int  # bytes of the largest array that it names; XLA may fuse it away
 
     @property
     def trips(self) -> int:
@@ -34,8 +33,7 @@ def lowered(traced: jax.stages.Traced, platform: str) -> Program:
     operations = [inner for function in functions.values() for inner in _inside(function)]
     callbacks = [name for op in operations if "callback" in (name := _target(op))]
     callbacks += [op.name for op in operations if op.name in _HOST]
-    sizes = [_bytes(result.type) for op in operations for result in op.results]
-    return Program(nests, callbacks, max(sizes, default=0))
+    return Program(nests, callbacks)
 
 
 _HOST = ("stablehlo.send", "stablehlo.recv", "stablehlo.infeed", "stablehlo.outfeed")
@@ -95,11 +93,3 @@ def _target(op) -> str:
     if op.name != "stablehlo.custom_call":
         return ""
     return op.attributes["call_target_name"].value
-
-
-def _bytes(kind) -> int:
-    shape = getattr(kind, "shape", None)
-    if shape is None:
-        return 0
-    width = getattr(kind.element_type, "width", 8)
-    return math.prod(shape) * max(width, 8) // 8
