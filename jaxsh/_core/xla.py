@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 # Bytes that one call on an accelerator may take for what it computes on the way. Reverse mode
-# takes up to four times that.
+# takes several times that.
 _ROOM = 2**30
 
 
@@ -27,7 +27,7 @@ def rows_are_split(array) -> bool:
 def cpu_alone() -> bool:
     """True where JAX has no accelerator: what is slow to trace for one need then not be traced.
 
-    `tests/test_accelerator.py` says no to it, and so sees what an accelerator would get.
+    `tests/accelerators.py` says no to it, and so sees what an accelerator would get.
     """
     return jax.default_backend() == "cpu"
 
@@ -130,8 +130,8 @@ def device_cache(maxsize: int):
     return decorate
 
 
-def rows_on_each(array, axis: int = 0) -> int:
-    """Counts the rows that one device has where a mesh shares them out."""
+def rows_on_each(array, axis: int) -> int:
+    """Counts the rows along an axis that one device has, where a mesh shares them out."""
     mesh = jax.typeof(array).sharding.mesh
     manual = jax.sharding.AxisType.Manual in mesh.axis_types  # inside `shard_map` the others' left
     devices = 1 if manual else math.prod(mesh.axis_sizes)
@@ -160,17 +160,29 @@ def in_blocks(function, *arrays, size: int, most: int | None = None, out: int = 
     `out` is the axis of the rows in the results.
     """
     rows = arrays[0].shape[0]
+    if rows <= size or on_mesh(arrays):
+        return function(*arrays)
+    # The accelerator's way too: what it kept for reverse mode would take memory on the CPU as well.
+    anew = jax.checkpoint(function)
+    small = functools.partial(block_by_block, anew, size=size, out=out)
+    large = anew
+    if most is not None and rows > most:
+        large = functools.partial(block_by_block, anew, size=equal_blocks(rows, most), out=out)
+    return jax.lax.platform_dependent(*arrays, cpu=small, default=large)
 
-    def blocks_of(size):
-        def blocks(*arrays):
-            def cut(array):
-                padding = [(0, -rows % size)] + [(0, 0)] * (array.ndim - 1)
-                return jnp.pad(array, padding, mode="edge").reshape(-1, size, *array.shape[1:])
 
-            done = jax.lax.map(lambda block: anew(*block), tuple(cut(array) for array in arrays))
-            return jax.tree.map(join, done)
+def block_by_block(function, *arrays, size: int, out: int = 0):
+    """`function(*arrays)` of `size` rows after the other on any device, as `in_blocks` on a CPU.
 
-        return blocks
+    The last block is filled up with the last row.
+    """
+    rows = arrays[0].shape[0]
+    if rows <= size:
+        return function(*arrays)
+
+    def cut(array):
+        padding = [(0, -rows % size)] + [(0, 0)] * (array.ndim - 1)
+        return jnp.pad(array, padding, mode="edge").reshape(-1, size, *array.shape[1:])
 
     def join(blocks):
         moved = jnp.moveaxis(blocks, 0, out)
@@ -178,12 +190,8 @@ def in_blocks(function, *arrays, size: int, most: int | None = None, out: int = 
         shape = moved.shape[:out] + joined + moved.shape[out + 2 :]
         return jax.lax.slice_in_dim(moved.reshape(shape), 0, rows, axis=out)
 
-    if rows <= size or on_mesh(arrays):
-        return function(*arrays)
-    # The accelerator's way too: what it kept for reverse mode would take memory on the CPU as well.
-    anew = jax.checkpoint(function)
-    default = anew if most is None or rows <= most else blocks_of(equal_blocks(rows, most))
-    return jax.lax.platform_dependent(*arrays, cpu=blocks_of(size), default=default)
+    done = jax.lax.map(lambda block: function(*block), tuple(cut(array) for array in arrays))
+    return jax.tree.map(join, done)
 
 
 def keep_rows(function, *arguments, like, axis: int, out) -> Any:

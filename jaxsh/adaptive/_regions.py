@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from .._core.xla import equal_blocks, on_mesh, rows_at_once
+from .._core.xla import block_by_block, equal_blocks, on_mesh, rows_at_once
 
 # Vertices per pass on a CPU: what they need stays in cache.
 BLOCK = 1024
@@ -30,32 +30,18 @@ def everywhere(work: Work, count: int, *, whole: bool = False) -> Float[Array, "
     """
     if whole or count <= BLOCK:
         return work(None)
-    again = jax.checkpoint(work)
+    again, most = jax.checkpoint(work), rows_at_once(_SIZE)
 
     def at_once(numbers):
-        most = rows_at_once(_SIZE)
-        return again(None) if count <= most else _by_block(again, numbers, most)
+        if count <= most:
+            return again(None)
+        return block_by_block(again, numbers, size=equal_blocks(count, most), out=1)
 
     def by_block(numbers):
-        return _by_block(again, numbers, BLOCK)
+        return block_by_block(again, numbers, size=BLOCK, out=1)
 
     numbers = jnp.arange(count, dtype=jnp.int32)
     return jax.lax.platform_dependent(numbers, cpu=by_block, default=at_once)
-
-
-def _by_block(work: Work, numbers: Int[Array, " n"], size: int) -> Float[Array, "rows n"]:
-    """Calls `work` on blocks of the numbers, one after the other."""
-    count = len(numbers)
-    if count <= size:
-        return work(numbers)
-    size = equal_blocks(count, size)
-    done = jax.lax.map(work, _cut(numbers, size))
-    return jnp.moveaxis(done, 0, 1).reshape(done.shape[1], -1)[:, :count]
-
-
-def _cut(numbers: Int[Array, " n"], size: int) -> Int[Array, "blocks size"]:
-    """Cuts into blocks, the last of which is filled up."""
-    return jnp.pad(numbers, (0, -len(numbers) % size), mode="edge").reshape(-1, size)
 
 
 def compacted(work: Work, active: Bool[Array, " v"]) -> Float[Array, "rows v"]:
@@ -73,24 +59,22 @@ def compacted(work: Work, active: Bool[Array, " v"]) -> Float[Array, "rows v"]:
     # Past the end where not active, and so dropped.
     numbers = jnp.zeros(count, jnp.int32).at[jnp.where(active, place, count)]
     numbers = numbers.set(jnp.arange(count, dtype=jnp.int32), mode="drop")
-    again = jax.checkpoint(work)
 
     def by_block(numbers, place):
-        def block(part):
-            start, rows = part
+        @jax.checkpoint
+        def block(order, rows):
             like = jax.eval_shape(work, rows)
             return jax.lax.cond(
-                start <= place[-1], work, lambda _: jnp.zeros(like.shape, like.dtype), rows
+                order[0] <= place[-1], work, lambda _: jnp.zeros(like.shape, like.dtype), rows
             )
 
-        parts = _cut(numbers, BLOCK)
-        starts = jnp.arange(len(parts), dtype=jnp.int32) * BLOCK
-        done = jax.lax.map(jax.checkpoint(block), (starts, parts))
-        return jnp.moveaxis(done, 0, 1).reshape(done.shape[1], -1)[:, :count]
+        order = jnp.arange(count, dtype=jnp.int32)
+        return block_by_block(block, order, numbers, size=BLOCK, out=1)
 
     def by_share(numbers, place):
         def share(size, numbers):
-            done = _by_block(again, numbers[:size], rows_at_once(_SIZE))
+            blocks = equal_blocks(size, rows_at_once(_SIZE))
+            done = block_by_block(jax.checkpoint(work), numbers[:size], size=blocks, out=1)
             return jnp.pad(done, ((0, 0), (0, count - size)))
 
         sizes = sorted({-(-count // part) for part in _SHARES})
