@@ -3,6 +3,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from balls import COUNT, DEGREE, WIDTH, shadowed_ball
 
 from jaxsh import harmonics, sphere, transfer
 from jaxsh.adaptive import (
@@ -14,13 +15,9 @@ from jaxsh.adaptive import (
     arrange,
     make_tile_atlas,
     make_tiles,
-    make_tiling,
     shade,
 )
-from jaxsh.transfer._glossy_kernels import product_nodes
 
-COUNT, DEGREE = 300, 3
-WIDTH = (DEGREE + 1) ** 2
 EYE = np.array([0.5, -3.0, 1.0])
 
 
@@ -30,13 +27,7 @@ def cast(tree, dtype):
 
 @pytest.fixture
 def ball(rng) -> transfer.Transfer:
-    """A sphere with shadows that differ from vertex to vertex."""
-    normals = sphere.fibonacci(COUNT).directions
-    cosine = harmonics.clamped_cosine(DEGREE)[harmonics.degrees(DEGREE)]
-    open_sky = harmonics.evaluate(normals, DEGREE) * cosine[None]
-    shadows = rng.normal(size=(COUNT, WIDTH)) * 0.05
-    ring = (np.arange(COUNT)[:, None] + np.array([-1, 1])) % COUNT
-    return transfer.Transfer(open_sky + shadows, normals, normals, jnp.asarray(ring, jnp.int32))
+    return shadowed_ball(rng)
 
 
 @pytest.fixture
@@ -142,61 +133,6 @@ def test_tiles_of_another_view_are_less_exact_and_no_more(ball, light):
         assert np.sqrt(np.mean((color - full) ** 2)) < 0.5 * np.std(full)
 
 
-def test_a_local_rule_is_the_best_for_its_directions(rng):
-    """No worse than least squares, on lights and lobes that least squares has not seen."""
-    degree, exponent, count = 4, 16.0, 20
-    rule = _local_rule.local_rule(degree, count, exponent)
-    nodes = product_nodes(degree)
-    lights = rng.normal(size=(4000, 25)) / np.sqrt(1 + harmonics.degrees(degree))
-    poles = _local_rule._poles(4000)
-    np.testing.assert_allclose(np.arccos(poles[:, 2]).max(), 0.3, rtol=0, atol=1e-4)
-    lobes = np.asarray(
-        harmonics.convolve(
-            harmonics.evaluate(rng.permutation(poles), degree), harmonics.phong(exponent, degree)
-        )
-    )
-
-    def products(basis):
-        return (basis @ lights.T) * (basis @ lobes.T)
-
-    coefficients = nodes.project @ products(nodes.basis)
-    values = products(np.asarray(harmonics.evaluate(rule.directions, degree)))
-    seen, unseen = slice(0, 2000), slice(2000, 4000)
-    fitted = np.linalg.lstsq(values[:, seen].T, coefficients[:, seen].T, rcond=None)[0]
-
-    def error(rows):
-        return np.sqrt(np.mean((rows.T @ values[:, unseen] - coefficients[:, unseen]) ** 2))
-
-    size = np.sqrt(np.mean(coefficients[:, unseen] ** 2))
-    assert error(rule.rows) < 1.02 * error(fitted)
-    assert error(rule.rows) < 0.22 * size
-
-
-def test_the_lobe_of_a_rule_is_the_lobe_down_to_its_lowest_cosine():
-    degree, exponent = 10, 32.0
-    rule = _local_rule.local_rule(degree, 40, exponent)
-    assert len(rule.powers) == 7
-    zonal = np.asarray(harmonics.phong(exponent, degree))
-    lobe = zonal * np.sqrt((2 * np.arange(degree + 1) + 1) / (4 * np.pi))
-    t = np.linspace(rule.lowest, 1, 50)
-    exact = np.polynomial.legendre.legval(t, lobe)
-    few = np.polynomial.polynomial.polyval(t - rule.middle, rule.powers @ zonal)
-    np.testing.assert_allclose(few, exact, rtol=0, atol=0.005 * exact[-1])
-    widest = -(np.arccos(rule.directions[:, 2]).max() + 0.15)
-    np.testing.assert_allclose(rule.lowest, np.cos(widest), rtol=0, atol=1e-12)
-
-
-def test_a_rule_of_all_directions_is_the_exact_one():
-    nodes, rule = product_nodes(4), _local_rule.local_rule(4, 200, 32.0)
-    np.testing.assert_array_equal(rule.directions, nodes.directions)
-    np.testing.assert_array_equal(rule.rows, nodes.project.T)
-    assert rule.lowest == -1
-    t = np.linspace(-1, 1, 9)
-    bands = np.polynomial.polynomial.polyvander(t, 4) @ rule.powers
-    exact = np.polynomial.legendre.legvander(t, 4) * np.sqrt((2 * np.arange(5) + 1) / (4 * np.pi))
-    np.testing.assert_allclose(bands, exact, rtol=0, atol=1e-13)
-
-
 def test_quantized_samples_are_half_a_scale_off(ball, light):
     plain, rounded = (
         make_tiles(ball, EYE, num_tiles=5, block=16, quantized=q) for q in (False, True)
@@ -267,55 +203,6 @@ def test_tiling_holds_each_vertex(ball, count, block):
     np.testing.assert_array_equal(np.unique(tile), np.arange(min(count, blocks)))
     np.testing.assert_array_equal(order.ravel()[tiles.place], np.arange(COUNT))
     np.testing.assert_array_equal(tiles.positions.T, ball.positions[order.ravel()])
-
-
-def test_atlas_takes_the_nearest_view(ball):
-    atlas = make_tile_atlas(
-        ball, distance=3.0, views=5, num_tiles=4, block=32, directions=7, exponent=9.0
-    )
-    for view in (0, 3):
-        eye = atlas.center + 2.5 * atlas.eyes[view]
-        assert atlas.view(eye) == view
-    eye = atlas.center + 3.0 * atlas.eyes[3]
-    expected = make_tiling(ball, eye, num_tiles=4, block=32)
-    expected = arrange(ball, expected, directions=7, exponent=9.0)
-    jax.tree.map(np.testing.assert_array_equal, atlas.nearest(ball, eye), expected)
-
-
-def test_follower_arrives_at_the_nearest_view(ball):
-    atlas = make_tile_atlas(ball, views=6, num_tiles=4, block=32)
-    follow = TileFollower(atlas, ball, atlas.eyes[0])
-    for eye in atlas.eyes:
-        jax.block_until_ready(follow(eye))
-    for _ in range(2):  # the set under way may still be one before
-        jax.block_until_ready(follow._sets)
-        arrived = follow(atlas.eyes[-1])
-    np.testing.assert_array_equal(arrived.tiling.permutation, atlas.permutation[-1])
-    assert len(follow._sets) <= 4
-
-
-def test_follower_in_slices_arranges_one_a_call(ball, light):
-    atlas = make_tile_atlas(ball, views=2, num_tiles=4, block=32)
-    follow = TileFollower(atlas, ball, atlas.eyes[0], slices=4)  # 10 blocks: 3, 3, 3 and the last
-    views = []
-    for _ in range(5):
-        views.append(follow(atlas.eyes[1]))
-        jax.block_until_ready(follow._sets)
-    moved = [bool((v.tiling.permutation == atlas.permutation[1]).all()) for v in views]
-    assert moved == [False, False, False, True, True]
-    whole = atlas.arranged(ball, 1)
-    for one, other in zip(jax.tree.leaves(views[-1]), jax.tree.leaves(whole), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-14, atol=1e-14)
-
-
-def test_follower_has_at_once_what_was_prepared_or_kept(ball):
-    atlas = make_tile_atlas(ball, views=6, num_tiles=4, block=32)
-    follow = TileFollower(atlas, ball, atlas.eyes[0], keep=2)
-    assert follow.prepare(np.asarray(atlas.eyes)[[1, 1, 4, 5]]) == 3
-    sets = [follow(atlas.eyes[view]) for view in (1, 4, 5, 1)]
-    for tiles, view in zip(sets, (1, 4, 5, 1), strict=True):
-        np.testing.assert_array_equal(tiles.tiling.permutation, atlas.permutation[view])
-    assert sets[3] is sets[0]
 
 
 def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
