@@ -1,6 +1,7 @@
 """Glossy shading with a few quadrature directions around each tile's mirrored direction."""
 
 import functools
+import math
 from collections.abc import Iterator
 
 import equinox as eqx
@@ -216,7 +217,12 @@ def arrange(
 
 
 def arranged_in_slices(
-    transfer: Transfer, tiling: Tiling, place, rule: LocalRule, diffuse: AbstractTransfer, slices
+    transfer: Transfer,
+    tiling: Tiling,
+    place: Int[np.ndarray, " v"],
+    rule: LocalRule,
+    diffuse: AbstractTransfer,
+    slices: int,
 ) -> Iterator[TileSet | None]:
     """Does what `arrange` does, in eight bits, in so many slices; yields None, and the set last.
 
@@ -225,7 +231,8 @@ def arranged_in_slices(
     parts = tuple(jnp.asarray(part, transfer.positions.dtype) for part in rule)
     rows, *outline = outlined(transfer, tiling, parts[0], parts[1])
     blocks = len(tiling.tile)
-    size, done = equal_blocks(blocks, -(-blocks // slices)), []
+    size = equal_blocks(blocks, math.ceil(blocks / slices))
+    done = []
     for start in range(0, blocks, size):
         # The last slice begins early, so that all have one shape and take one program.
         first = min(start, blocks - size)
@@ -233,7 +240,7 @@ def arranged_in_slices(
         done.append(tuple(array[start - first :] for array in part))
         if start + size < blocks:
             yield None
-    samples, scales = (jnp.concatenate(parts) for parts in zip(*done, strict=True))
+    samples, scales = (jnp.concatenate(some) for some in zip(*done, strict=True))
     yield _tile_set(tiling, place, parts, diffuse, (samples, scales, *outline))
 
 

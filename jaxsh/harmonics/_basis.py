@@ -193,7 +193,7 @@ def _row_by_row(row, basis: Float[Array, "k n"], *arguments):
     """
     numbers = np.arange(len(basis), dtype=np.int32)
 
-    def in_turn(basis, *arguments):
+    def one_by_one(basis, *arguments):
         once = jax.checkpoint(row, prevent_cse=False)
         return jax.lax.map(lambda k: once(k, basis, *arguments), jnp.asarray(numbers))
 
@@ -202,7 +202,7 @@ def _row_by_row(row, basis: Float[Array, "k n"], *arguments):
     def at_once(basis, *arguments):
         return jax.vmap(lambda k: row(k, basis, *arguments))(jnp.asarray(numbers))
 
-    return jax.lax.platform_dependent(basis, *arguments, cpu=in_turn, default=at_once)
+    return jax.lax.platform_dependent(basis, *arguments, cpu=one_by_one, default=at_once)
 
 
 def _rows(vectors: Float[Array, "3 1 n"]) -> tuple[Float[Array, " n"], ...]:

@@ -30,8 +30,8 @@ def shade(
     What `shade_diffuse` makes of `extrapolate` (one sample) or `interpolate` (many), in another
     order: the transfer is multiplied with all terms of the expansions first, T · [c, ∇c], and
     what is left, 3·M numbers per vertex and sample, with the offset's powers and the weights. The
-    light of each vertex, K·3 numbers, is never stored. (Of many samples it is, but on one CPU: a
-    product of two large matrices is what an accelerator likes.)
+    light of each vertex, K·3 numbers, is never stored on one CPU. An accelerator stores it where
+    there are many samples, and so multiplies two large matrices instead of many small ones.
 
     **Arguments**
 

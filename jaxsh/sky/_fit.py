@@ -30,7 +30,14 @@ from ._solve import Solution, Solver, least_squares
 
 # Those that the named fits pass on.
 OPTIONS = (
-    *("zenith", "weight", "lawson", "samples", "project", "solver", "max_steps", "throw"),
+    "zenith",
+    "weight",
+    "lawson",
+    "samples",
+    "project",
+    "solver",
+    "max_steps",
+    "throw",
     "devices",
 )
 
