@@ -13,8 +13,20 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from .._core.xla import materialize, on_mesh, rows_at_once, varying_as
-from ..harmonics import degrees, evaluate
+from ..harmonics import degrees
 from ..harmonics._tables import gradient_table
+from ._arc_nodes import (
+    Pair,
+    Rows,
+    Spans,
+    basis_at,
+    integrate_both,
+    integrate_even,
+    integrate_odd,
+    nodes_of,
+    sloped_nodes_of,
+    times,
+)
 from ._vectors import (
     close_cross,
     cross,
@@ -29,7 +41,6 @@ from ._vectors import (
 
 _Y0 = float(np.sqrt(1 / (4 * np.pi)))
 
-Rows = Float[Array, "*arcs 3 n"]
 Vectors = Float[Array, "*_ 3 _"]  # of any shapes that broadcast
 
 
@@ -106,8 +117,8 @@ def coefficients(
         flux, angle = total
         span, normal, triangle = arc
         if degree:
-            nodes, weights = materialize(functools.partial(_nodes, degree), span)
-            integral = materialize(_integrate_even, _basis(nodes, degree - 1), weights)
+            nodes, weights = materialize(functools.partial(nodes_of, degree), span)
+            integral = materialize(integrate_even, basis_at(nodes, degree - 1), weights)
             flux = flux + normal[:, None] * integral[None]
         return flux, angle + _angle(triangle)
 
@@ -136,8 +147,8 @@ def _rate(arcs: Arcs, moves: Arcs, active: Array | None, degree: int):
     @jax.checkpoint  # in reverse, evaluate an arc's basis again rather than hold those of all
     def add_arc(total, arc):
         span, speed = arc
-        nodes, weights = materialize(functools.partial(_nodes, degree + 2), span)
-        return total + _integrate_odd(_basis(nodes, degree), _times(weights, nodes, speed))
+        nodes, weights = materialize(functools.partial(nodes_of, degree + 2), span)
+        return total + integrate_odd(basis_at(nodes, degree), times(weights, nodes, speed))
 
     nothing = _nothing(start, (degree + 1) ** 2)
     return _sum(add_arc, nothing, (_spans(arcs), speed), active, degree)
@@ -148,14 +159,14 @@ def coefficients_with_gradient(
 ) -> tuple[Float[Array, "k n"], Float[Array, "3 k n"]]:
     """∫ y_k dω, and its gradient by the receiver's position, eq. (4), at the same nodes."""
     lower = degree**2
-    sloped_nodes = functools.partial(_sloped_nodes, degree + 2)
+    sloped_nodes = functools.partial(sloped_nodes_of, degree + 2)
 
     @jax.checkpoint
     def add_arc(total, arc):
         flux, pull, angle = total
         span, normal, near, triangle = arc
         nodes, weights, slopes = materialize(sloped_nodes, span, near)
-        change, *integrals = materialize(_integrate_both, _basis(nodes, degree), weights, slopes)
+        change, *integrals = materialize(integrate_both, basis_at(nodes, degree), weights, slopes)
         if degree:
             flux = flux + normal[:, None] * integrals[0][None]
         return flux, pull + normal[:, None] * change[None], angle + _angle(triangle)
@@ -215,9 +226,6 @@ def _sum(add_arc, total, arcs, active: Bool[Array, " arcs"] | None, degree: int)
     return jax.lax.platform_dependent(total, arcs, active, cpu=one_by_one, default=together)
 
 
-Pair = tuple[Array, Array]  # of a complex number, or of weights for even and odd integrands
-
-
 def _nothing(start: Rows, *shape: int) -> Array:
     """Zeros (*shape, n)."""
     return varying_as(jnp.zeros((*shape, start.shape[-1]), start.dtype), start)
@@ -229,23 +237,14 @@ def _angle(triangle: Pair) -> Float[Array, " n"]:
     return 2 * jnp.arctan2(y, jnp.where((x == 0) & (y == 0), 1, x))
 
 
-class _Spans(NamedTuple):
-    """Arcs as their middles, the tangents there, and sine and cosine of half their angles."""
-
-    middle: Rows
-    tangent: Rows
-    sine: Float[Array, "*arcs n"]
-    cosine: Float[Array, "*arcs n"]
-
-
-def _spans_and_triangles(arcs: Arcs, apex: Float[Array, "3 n"]) -> tuple[_Spans, Pair]:
+def _spans_and_triangles(arcs: Arcs, apex: Float[Array, "3 n"]) -> tuple[Spans, Pair]:
     """Arcs by their middles, and the complex numbers of eq. (2) of their triangles (apex, a, b)."""
     spans, apex = _spans(arcs), apex[None]
     real = dot(apex, spans.middle) + spans.cosine
     return spans, (real, -dot(apex, arcs.normal) * spans.sine)
 
 
-def _spans(arcs: Arcs) -> _Spans:
+def _spans(arcs: Arcs) -> Spans:
     """Arcs by their middles.
 
     A middle is along a + b for arcs below π/2; above, b - a along the tangent has the digits.
@@ -268,77 +267,7 @@ def _spans(arcs: Arcs) -> _Spans:
     sine = jnp.where(wide, larger, smaller)
     # Zero for an arc of no length: a receiver on the edge.
     cosine = jnp.where(inverse == 0, 1, jnp.where(wide, smaller, larger))
-    return _Spans(middle, tangent, sine, cosine)
-
-
-def _nodes(count: int, span: _Spans) -> tuple[Float[Array, "3 count n"], Pair]:
-    """Nodes on an arc's great circle, and their weights for even and for odd integrands.
-
-    Exact up to degree count - 1, eq. (3).
-    """
-    t = (np.arange(count) - (count - 1) / 2) * np.pi / count
-    k = np.arange(1, count)[:, None]
-    table = 4 / (count * k) * np.cos(k * t)
-    middle, tangent, sine, cosine = span
-    cos, sin, factors = (
-        jnp.asarray(x, sine.dtype)[..., None] for x in (np.cos(t), np.sin(t), table)
-    )
-    sines = [jnp.zeros_like(sine), sine]  # of kθ/2
-    for _ in range(2, count):
-        sines.append(2 * cosine * sines[-1] - sines[-2])
-    even = jnp.broadcast_to(2 * jnp.arctan2(sine, cosine)[None] / count, (count, len(sine)))
-    odd = jnp.zeros_like(even)
-    for k in range(2, count, 2):
-        even = even + factors[k - 1] * sines[k][None]
-    for k in range(1, count, 2):
-        odd = odd + factors[k - 1] * sines[k][None]
-    points = cos[None] * middle[:, None] + sin[None] * tangent[:, None]
-    return points, (even, odd)
-
-
-def _sloped_nodes(count: int, span: _Spans, slope: Float[Array, "3 n"]):
-    """Place the nodes of `_nodes`, and weigh slope·ω at them too."""
-    nodes, weights = _nodes(count, span)
-    return nodes, weights, _times(weights, nodes, slope)
-
-
-def _times(weights: Pair, nodes: Float[Array, "3 j n"], slope: Float[Array, "3 n"]) -> Pair:
-    """The weights times slope·ω at each node."""
-    x, y, z = nodes
-    value = slope[0][None] * x + slope[1][None] * y + slope[2][None] * z
-    return weights[0] * value, weights[1] * value
-
-
-def _basis(nodes: Float[Array, "3 j n"], degree: int) -> Float[Array, "k j n"]:
-    if on_mesh(nodes):  # receivers first, since rows of nodes and receivers would be gathered
-        return jnp.swapaxes(evaluate(nodes.T, degree, axis=0), 1, 2)
-    return materialize(lambda rows: evaluate(jnp.moveaxis(rows, 0, -1), degree, axis=0), nodes)
-
-
-def _integrate_even(basis: Array, weights: Pair) -> Float[Array, "k n"]:
-    """∫ y_k dt: integrands of the parity of l."""
-    return _integrate(basis, weights, 0)
-
-
-def _integrate_odd(basis: Array, weights: Pair) -> Float[Array, "k n"]:
-    """∫ y_k (slope·ω) dt: integrands of the parity of l + 1."""
-    return _integrate(basis, weights, 1)
-
-
-def _integrate_both(basis: Float[Array, "k j n"], weights: Pair, slopes: Pair):
-    """∫ y_k (slope·ω) dt, and ∫ y_k dt for all degrees but the last."""
-    lower = (round(len(basis) ** 0.5) - 1) ** 2
-    odd = _integrate_odd(basis, slopes)
-    return (odd, _integrate_even(basis[:lower], weights)) if lower else (odd,)
-
-
-def _integrate(basis: Array, weights: Pair, parity: int) -> Float[Array, "k n"]:
-    l = degrees(round(len(basis) ** 0.5) - 1)
-    odd = ((l + parity) % 2).astype(bool)[:, None]
-    total = jnp.zeros_like(basis[:, 0])
-    for j, (w_even, w_odd) in enumerate(zip(*weights, strict=True)):
-        total = total + basis[:, j] * jnp.where(odd, w_odd[None], w_even[None])
-    return total
+    return Spans(middle, tangent, sine, cosine)
 
 
 def _from_flux(flux: Float[Array, "3 k n"], angle: Array, degree: int) -> Float[Array, "_ n"]:
