@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float
 
 from .._core.checks import as_finite, as_float, check_vectors, described
-from ..transfer import Transfer, unshadowed
+from ..transfer import AbstractTransfer, StoredTransfer, Transfer, unshadowed
 from ._checks import check_data
 
 
@@ -36,6 +36,12 @@ def as_rows(
     """
     observed, albedo = as_float(observed, "observed"), as_float(albedo, "albedo")
     given = isinstance(surface, Transfer)
+    if not given and isinstance(surface, AbstractTransfer | StoredTransfer):
+        stored = isinstance(surface, StoredTransfer)
+        instead = "its .load()" if stored else "the Transfer that it was made of"
+        raise TypeError(
+            f"expected normals or a Transfer, got a {type(surface).__name__}: give {instead}"
+        )
     normals = surface.normals if given else as_float(surface, "normals")
     check_vectors("normals", normals)
     if normals.ndim < 2:

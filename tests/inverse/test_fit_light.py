@@ -299,3 +299,15 @@ def test_errors(rng, unchecked):
     ]:
         with pytest.raises(ValueError, match=sentence):
             inverse.fit_light(*arguments, **options)
+
+
+def test_other_forms_of_a_transfer_are_refused_with_what_to_give(unchecked):
+    points = sphere.fibonacci(9).directions
+    eight_bits = transfer.quantize(transfer.unshadowed(points, points, 1))
+    stored = object.__new__(transfer.StoredTransfer)  # only its class is looked at
+    for form, sentence in [
+        (stored, r"got a StoredTransfer: give its \.load\(\)"),
+        (eight_bits, "got a QuantizedTransfer: give the Transfer that it was made of"),
+    ]:
+        with pytest.raises(TypeError, match=sentence):
+            inverse.fit_light(np.ones((9, 3)), form, 0.5, 1)

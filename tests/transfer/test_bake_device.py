@@ -184,9 +184,11 @@ def test_a_chunk_has_no_loops_but_those_of_its_rays(platform, name, nests):
     assert program.callbacks == []
 
 
-def test_a_scene_that_jax_does_not_cast_is_refused():
+def test_a_scene_that_jax_does_not_cast_is_refused(unchecked):
     with pytest.raises(ValueError, match="needs a scene whose rays JAX casts, a JaxRayScene, got"):
         baked(scene=ray_scene(MESH), device=True)
+    with pytest.raises(ValueError, match=r"expected device as True .* or None .*, got"):
+        baked(device=jax.devices()[0])
 
 
 def test_an_accelerator_casts_by_default(monkeypatch):

@@ -11,7 +11,7 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Float
 
-from ..._core.checks import check_flag, described
+from ..._core.checks import described
 from ...geometry import JaxRayScene, Mesh, RayScene, ray_scene
 from ._chunk import Reflectors, bounced_rows, lights, reflectors, shadowed_rows
 from ._gather import TILE
@@ -31,12 +31,16 @@ def takes_device(device: bool | None, scene: RayScene | None) -> bool:
     ours = scene is None or isinstance(scene, JaxRayScene)
     if device is None:
         return ours and _default_platform() != "cpu"
-    device = check_flag("device", device)
+    if not isinstance(device, bool | np.bool_):
+        raise ValueError(
+            "expected device as True for rays on JAX's default device, False for the host, or None "
+            f"for the device where it is a GPU or TPU, got {described(device)}"
+        )
     if device and not ours:
         raise ValueError(
             f"device=True needs a scene whose rays JAX casts, a JaxRayScene, got {described(scene)}"
         )
-    return device
+    return bool(device)
 
 
 def _default_platform() -> str:
