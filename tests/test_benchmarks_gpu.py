@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from benchmarks import _gpu_cases, _gpu_limits, gpu
+from benchmarks import _gpu_frames, _gpu_limits, gpu
+from benchmarks._gpu_case import Case
 from jaxsh import adaptive, sphere, transfer
 
 
@@ -17,7 +18,7 @@ def test_a_case_is_set_beside_its_limit():
     # An amount per second of 1 for each limit: the share is the rate.
     limits = {name: {"value": 1.0, "unit": probe.unit} for name, probe in _gpu_limits.probes(8, 4)}
     square = jnp.ones((4, 4), jnp.float32)
-    case = _gpu_cases.Case(
+    case = Case(
         *("square", jnp.matmul, (square, square), 16, "numbers", 192.0),
         limit="tf32",
         operations=128.0,
@@ -39,7 +40,7 @@ def test_colors_in_tf32_are_set_beside_full_ones():
     limits = {name: {"value": 1.0, "unit": "B/s"} for name in ("copy", "read", "float32", "tf32")}
     full, row = {}, {}
     for scale, precision in ((1.0, "float32"), (1.5, "tf32")):
-        case = _gpu_cases.Case(
+        case = Case(
             "colors", lambda x: x, (jnp.full(3, scale),), 3, "vertices", 1.0, precision=precision
         )
         row = gpu.measure(case, limits, rounds=1, full=full)
@@ -59,7 +60,7 @@ def test_a_wrong_expression_is_refused_before_the_work(tmp_path):
 
 @pytest.mark.slow
 def test_tiles_are_repeated():
-    [case] = _gpu_cases._tiles(301, 80)  # 3 × 100
+    [case] = _gpu_frames.tiles(301, 80)  # 3 × 100
     tiles, light, eye, material = case.arguments
     glossy = transfer.Material(0.0, material.specular, material.exponent)
     parts = case.function(tiles, light, eye, glossy).reshape(3, 100, 3)
