@@ -6,8 +6,9 @@
 # (lint, types), make docs (the pages, built strictly), make test-oldest (the oldest JAX that is
 # supported), make test-newest (the newest Python here, and its JAX), make test-minimal (without the
 # packages that only some functions need), make package (wheel and sdist), make bench (beside the
-# peers), make gpu (times of the device that JAX takes beside its limits, as JSON), make fuzz (changed files of every format, a million of each: FUZZ="--inputs 10000 --formats
-# obj glb" for fewer), make clean.
+# peers), make gpu (times of the device that JAX takes beside its limits, as JSON), make fuzz (changed
+# files of every format, a million of each: FUZZ="--inputs 10000 --formats obj glb" for fewer), make
+# clean.
 
 PYTHON ?= python3
 VENV ?= .venv
