@@ -21,6 +21,7 @@ from .workers import (
     cores,
     cpu_seconds,
     folder_bytes,
+    in_a_process,
     peak_gigabytes,
     processes,
     read_seconds,
@@ -29,6 +30,7 @@ from .workers import (
 
 _BILLION = 10**9
 _BLOCK = 32_768  # vertices of a block of a mesh so large
+_LEAST = 1e-3  # GB or seconds that can be told from none
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,12 +49,16 @@ class Config:
     """that shade the large mesh at once"""
     tasks: int = 5000
     """empty tasks that tell the scheduler's limit"""
+    memory: float = 256.0
+    """of a machine on paper, in GB"""
 
     def __post_init__(self):
         if min(self.vertices, self.large) < 300:
             raise ValueError("vertices and large must be at least 300")
         if min(self.workers, self.rounds, self.lights, self.tasks, self.directions) < 1:
             raise ValueError("workers, rounds, lights, tasks and directions must be at least 1")
+        if self.memory <= 0:
+            raise ValueError("memory must be above 0")
 
 
 @experiment("scale")
@@ -71,7 +77,7 @@ def scale(config: Config, context: Context) -> list[Table]:
     return [
         Table("Scaling", rows=scaling, values=values),
         Table("A large mesh", rows=own, values={"workers": config.workers}),
-        _on_paper(context, rays, rate, tasks, large),
+        *_on_paper(config, context, rays, rate, tasks, large),
     ]
 
 
@@ -132,30 +138,37 @@ def _scaling(config: Config, context: Context, folder: Path) -> tuple[float, flo
     return rays, len(several.vertices) * rays / seconds["strong, all"] / config.workers
 
 
-def _large(config: Config, context: Context, folder: Path, rays: float) -> dict[str, float]:
+class PerVertex(NamedTuple):
+    """What a vertex of the large mesh takes: in GB, and in seconds before the first block."""
+
+    store: float
+    worker: float
+    client: float
+    serial: float
+
+
+def _large(config: Config, context: Context, folder: Path, rays: float) -> PerVertex:
     """Bake and shade the large mesh; gives what the model takes from it."""
 
     def note(what: str, value: float, unit: str) -> float:
         context.record({"kind": "large", "what": what, "value": value, "unit": unit})
         return value
 
-    mesh, path = geometry.knot(config.large), folder / "large"
-    count = len(mesh.vertices)
     bake: dict[str, Any] = {"degree": config.degree, "directions": config.directions}
     bake |= {"seed": context.seed, "progress": False}
-    with processes(config.workers) as client:
-        peak_gigabytes(fresh=True)
-        small = _timed_bake(client, geometry.knot(300), folder / "small", bake)
-        run = _timed_bake(client, mesh, path, bake)
+    # In a process of its own: what this one did before would count as the client's memory.
+    sizes = {"small": 300, "large": config.large}
+    small, run = in_a_process(_timed_bakes, config.workers, sizes, folder, bake)
+    path, count = folder / "large", run.vertices
     stored = transfer.open(path)
     note("seconds", run.seconds, "s")
     note("of them before the first block is written", run.serial, "s")
     note("rays", count * rays / 1e9, "10⁹")
     note("rays per second", count * rays / run.seconds / 1e6, "10⁶/s")
     note("peak memory of a worker", run.worker, "GB")
-    note("of it for a mesh of 300", small.worker, "GB")
+    note("peak memory of a worker for a mesh of 300", small.worker, "GB")
     note("peak memory of the client", run.client, "GB")
-    note("of it for a mesh of 300", small.client, "GB")
+    note("peak memory of the client for a mesh of 300", small.client, "GB")
     size = note("bytes of the store", folder_bytes(path) / 1e9, "GB")
     coefficients = folder_bytes(path / "coefficients")
     note("of them coefficients", coefficients / 1e9, "GB")
@@ -176,37 +189,49 @@ def _large(config: Config, context: Context, folder: Path, rays: float) -> dict[
         statistics.median(a / b for a, b in zip(reading, shading, strict=True)),
         "",
     )
-    return {
-        "bytes": size / count,
-        "tree": max(run.worker - small.worker, 0.0) / count,
-        "client": max(run.client - small.client, 0.0) / count,
-        "serial": max(run.serial - small.serial, 0.0) / count,
-    }
+    return PerVertex(
+        store=size / count,
+        # A mesh of some thousand vertices is lost in the noise: then the least there is.
+        worker=max(run.worker - small.worker, _LEAST) / count,
+        client=max(run.client - small.client, _LEAST) / count,
+        serial=max(run.serial - small.serial, _LEAST) / count,
+    )
 
 
 class Run(NamedTuple):
     """A bake on a cluster: its seconds, and the most memory in GB of a worker and of the client."""
 
+    vertices: int
     seconds: float
     serial: float  # before the first block was written
     worker: float
     client: float
 
 
-def _timed_bake(client: Any, mesh: geometry.Mesh, path: Path, bake: dict[str, Any]) -> Run:
+def _timed_bakes(
+    workers: int, sizes: dict[str, int], folder: Path, bake: dict[str, Any]
+) -> list[Run]:
+    """Bake knots, the smaller first: a worker's peak is of all that it did."""
+    with processes(workers) as client:
+        transfer.bake_on(client, geometry.knot(300), store=folder / "first", **bake)  # compiles
+        return [_timed_bake(client, size, folder / name, bake) for name, size in sizes.items()]
+
+
+def _timed_bake(client: Any, vertices: int, path: Path, bake: dict[str, Any]) -> Run:
+    mesh = geometry.knot(vertices)
+    peak_gigabytes(fresh=True)  # to make the mesh took memory too
     start, called = time.perf_counter(), time.time()
     transfer.bake_on(client, mesh, store=path, **bake)
     seconds = time.perf_counter() - start
-    first = min(file.stat().st_mtime for file in (path / "coefficients" / "c").glob("*/0"))
-    worker = max(client.run(peak_gigabytes).values())
-    return Run(seconds, first - called, worker, peak_gigabytes())
+    own, worker = peak_gigabytes(), max(client.run(peak_gigabytes).values())
+    written = min(file.stat().st_mtime for file in (path / "coefficients" / "c").glob("*/0"))
+    return Run(len(mesh.vertices), seconds, written - called, worker, own)
 
 
 def _on_paper(
-    context: Context, rays: float, rate: float, tasks: float, large: dict[str, float]
-) -> Table:
-    """Say what a billion vertices would take, by the number of threads."""
-    blocks = math.ceil(_BILLION / _BLOCK)
+    config: Config, context: Context, rays: float, rate: float, tasks: float, large: PerVertex
+) -> list[Table]:
+    """Say what a billion vertices would take, by the number of threads, and where that ends."""
     each = _BLOCK * rays / rate  # seconds of a block
     for threads in (2, 16, 128, 1024, 8192):
         busy = threads / each
@@ -215,20 +240,33 @@ def _on_paper(
                 "kind": "paper",
                 "threads": threads,
                 "hours": _BILLION * rays / rate / threads / 3600,
-                "serial": _BILLION * large["serial"] / 3600,
+                "serial": _BILLION * large.serial / 3600,
                 "tasks_per_second": busy,
                 "share": 100 * busy / tasks,
             }
         )
     values = {
         "rays": _BILLION * rays,
-        "store": _BILLION * large["bytes"],
-        "blocks": blocks,
+        "store": _BILLION * large.store,
+        "blocks": math.ceil(_BILLION / _BLOCK),
         "rate": rate / 1e6,
         "tasks": tasks,
-        "most": tasks * each,
-        "tree": _BILLION * large["tree"],
-        "client": _BILLION * large["client"],
     }
-    rows = [row for row in context.rows if row["kind"] == "paper"]
-    return Table("On paper: a billion vertices", rows=rows, values=values)
+    paper = [row for row in context.rows if row["kind"] == "paper"]
+    threads = {
+        "the client's part takes as long as the rays": rays / rate / large.serial,
+        "the scheduler hands out no more blocks": tasks * each,
+    }
+    vertices = {
+        f"{name} holds {config.memory:g} GB": config.memory / size / 1e6
+        for name, size in (("the client", large.client), ("a worker process", large.worker))
+    }
+    for unit, ends in (("threads", threads), ("million vertices", vertices)):
+        for what in sorted(ends, key=ends.__getitem__):
+            context.record({"kind": "end", "what": what, "value": ends[what], "unit": unit})
+    ends = [row for row in context.rows if row["kind"] == "end"]
+    needs = {"client": _BILLION * large.client, "worker": _BILLION * large.worker}
+    return [
+        Table("On paper: a billion vertices", rows=paper, values=values),
+        Table("Where it ends", rows=ends, values=needs),
+    ]

@@ -3,10 +3,12 @@
 import contextlib
 import itertools
 import math
+import multiprocessing
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +43,12 @@ def processes(count: int) -> Iterator[Any]:
         Client(cluster) as client,
     ):
         yield client
+
+
+def in_a_process(function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a function of a module gives in a new Python process, which ends with it."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as one:
+        return one.submit(function, *arguments).result()
 
 
 def cores() -> int:

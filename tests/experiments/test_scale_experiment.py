@@ -32,3 +32,11 @@ def test_scale(tmp_path):
     # Each line is the one before it, shared by eight times as many.
     for one, other in itertools.pairwise(paper):
         assert one["hours"] / other["hours"] == pytest.approx(8, rel=1e-6)
+    ends = {row["what"]: row["value"] for row in rows if row["kind"] == "end"}
+    # With so many threads the rays take as long as the part that no thread shortens.
+    threads = ends["the client's part takes as long as the rays"]
+    assert paper[0]["hours"] * paper[0]["threads"] / threads == pytest.approx(paper[0]["serial"])
+    assert len(ends) == 4
+    assert min(ends.values()) > 0
+    # Nothing that the process did before counts as the client's memory.
+    assert large["peak memory of the client"] < 1
