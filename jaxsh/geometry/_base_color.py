@@ -10,6 +10,8 @@ class BaseColor(eqx.Module):
 
     `factor` is linear RGBA. `texture`, if any, is the picture as stored: 8-bit sRGB with linear
     alpha, shape (h, w, 4), its top row at v = 1. `double_sided` is what the file says of it.
+    `unlit`: the base color is what the surface sends out already, under no other light
+    (KHR_materials_unlit of glTF).
 
     **Example**
 
@@ -27,3 +29,4 @@ class BaseColor(eqx.Module):
     )
     texture: UInt8[Array | np.ndarray, "h w 4"] | None = None
     double_sided: bool = eqx.field(static=True, default=False)
+    unlit: bool = eqx.field(static=True, default=False)

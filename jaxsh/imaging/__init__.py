@@ -12,6 +12,7 @@ from ._environment import read_environment, studio
 from ._light import read_light, write_light
 from ._movie import write_movie
 from ._raster import Raster, interpolate, rasterize
+from ._relit import write_relit
 from ._splats import Splats, read_splats, write_splats
 from ._write import write_image
 
@@ -35,5 +36,6 @@ __all__ = [
     "write_image",
     "write_light",
     "write_movie",
+    "write_relit",
     "write_splats",
 ]

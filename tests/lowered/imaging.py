@@ -15,6 +15,7 @@ WITHOUT = {
     "write_image": FILES,
     "write_light": FILES,
     "write_movie": FILES,
+    "write_relit": FILES,
     "write_splats": FILES,
 }
 

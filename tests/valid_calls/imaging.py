@@ -110,6 +110,17 @@ def calls():
             finite="frames fps quality",
             slow=True,
         ),
+        "write_relit": of(
+            i.write_relit,
+            path="/dev/null/no/a.glb",
+            mesh=mesh,
+            radiance=floats(300, 3),
+            exposure=1.0,
+            textured=False,
+            up="y",
+            finite="radiance exposure",
+            slow=True,
+        ),
         "write_splats": of(
             i.write_splats,
             path="/dev/null/no/a.ply",

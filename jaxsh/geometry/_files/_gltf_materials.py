@@ -93,7 +93,8 @@ class Materials:
         if any(numbers(fields, "emissiveFactor", owner, 3, [0.0, 0.0, 0.0])):
             self._document.note("materials that give off light read as if they did not")
         self._other_maps += _other_maps(fields, owner)
-        surface = _Surface(BaseColor(name, (r, g, b, a), None, double_sided))
+        unlit = extension(fields, "KHR_materials_unlit", owner) is not None
+        surface = _Surface(BaseColor(name, (r, g, b, a), None, double_sided, unlit))
         if base.get(texture_key) is None:
             return surface
         return self._with_texture(surface, inner(base, texture_key, owner), owner)

@@ -24,9 +24,10 @@ class _Format(NamedTuple):
 
 
 _POSITIONS_ONLY = ("hard edges", "uv", "colors", "materials")
+_NOT_IN_OBJ = ("alpha of colors", "double-sided materials", "unlit materials")
 _FORMATS = {
     ".ply": _Format(ply_files, leaves_out=("materials",)),
-    ".obj": _Format(obj_files, leaves_out=("alpha of colors", "double-sided materials")),
+    ".obj": _Format(obj_files, leaves_out=_NOT_IN_OBJ),
     ".glb": _Format(glb_files, up="y", leaves_out=("colors over 1",)),
     ".stl": _Format(stl_files, leaves_out=_POSITIONS_ONLY),
     ".off": _Format(off_files, leaves_out=_POSITIONS_ONLY),

@@ -104,6 +104,8 @@ def has(arrays: Arrays, what: str) -> bool:
             return arrays.colors is not None and bool((arrays.colors > 1).any())
         case "double-sided materials":
             return any(one.double_sided for one in arrays.materials)
+        case "unlit materials":
+            return any(one.unlit for one in arrays.materials)
         case "hard edges":
             return len(np.unique(arrays.vertices, axis=0)) < len(arrays.vertices)
         case "materials":

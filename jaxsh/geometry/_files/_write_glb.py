@@ -12,6 +12,7 @@ from ._write_arrays import Arrays
 
 _FLOAT, _UINT32 = 5126, 5125
 _ARRAY, _ELEMENTS = 34962, 34963  # what a part of the buffer is for
+_UNLIT = "KHR_materials_unlit"
 _KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
@@ -122,8 +123,12 @@ def _materials(materials: tuple[BaseColor, ...], buffer: _Buffer) -> dict[str, A
         one: dict[str, Any] = {"name": material.name, "pbrMetallicRoughness": surface}
         if material.double_sided:
             one["doubleSided"] = True
+        if material.unlit:
+            one["extensions"] = {_UNLIT: {}}
         described.append(one)
     parts: dict[str, Any] = {}
+    if any(material.unlit for material in materials):
+        parts["extensionsUsed"] = [_UNLIT]
     if described:
         parts["materials"] = described
     if images:
