@@ -48,6 +48,7 @@ REASONS = {
         "write_image": NO_ARRAYS,
         "write_light": HOST,
         "write_movie": NO_ARRAYS,
+        "write_relit": HOST,
         "write_splats": HOST,
     },
     "inverse": {"light_variances": NO_ARRAYS},

@@ -55,7 +55,8 @@ def write_relit(
     >>> from jaxsh import geometry, imaging, sphere, transfer
     >>> mesh = geometry.knot(300)
     >>> light = sphere.project_lat_long(imaging.studio(16, 32), degree=2)
-    >>> shaded = transfer.shade_diffuse(light, transfer.unshadowed(mesh.vertices, mesh.normals, 2))
+    >>> made = transfer.unshadowed(mesh.vertices, mesh.normals, 2)
+    >>> shaded = transfer.shade_diffuse(light, made, albedo=0.8)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = imaging.write_relit(pathlib.Path(folder) / "knot.glb", mesh, shaded)
     ...     geometry.read_mesh(path).materials[0].unlit
