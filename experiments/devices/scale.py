@@ -158,7 +158,7 @@ def _large(config: Config, context: Context, folder: Path, rays: float) -> PerVe
     bake |= {"seed": context.seed, "progress": False}
     # In a process of its own: what this one did before would count as the client's memory.
     sizes = {"small": 300, "large": config.large}
-    small, run = in_a_process(_timed_bakes, config.workers, sizes, folder, bake)
+    small, run = in_a_process(timed_bakes, config.workers, sizes, folder, bake)
     path, count = folder / "large", run.vertices
     stored = transfer.open(path)
     note("seconds", run.seconds, "s")
@@ -208,7 +208,7 @@ class Run(NamedTuple):
     client: float
 
 
-def _timed_bakes(
+def timed_bakes(
     workers: int, sizes: dict[str, int], folder: Path, bake: dict[str, Any]
 ) -> list[Run]:
     """Bake knots, the smaller first: a worker's peak is of all that it did."""
