@@ -1,4 +1,4 @@
-"""Shapes and the rays between them: triangle meshes, read from files or made, and ray casting.
+"""Shapes and the rays between them: triangle meshes, points, texels of a mesh, and ray casting.
 
 Meshes are JAX arrays and their normals differentiate. Rays run on all cores through Embree, or
 through JAX where there is no Embree, in float32; they take NumPy or JAX arrays and give NumPy
@@ -12,8 +12,10 @@ from ._files._write import write_mesh
 from ._knot import knot
 from ._make import make_mesh
 from ._mesh import Mesh, vertex_normals
+from ._points import Points
 from ._rays import Hit, RayScene
 from ._read import read_mesh
+from ._texels import Surface, Texels, texels
 from ._topology import Topology, neighbors, topology
 from ._trace import Trace, trace
 from ._tree import RayTree
@@ -25,8 +27,11 @@ __all__ = [
     "Hit",
     "JaxRayScene",
     "Mesh",
+    "Points",
     "RayScene",
     "RayTree",
+    "Surface",
+    "Texels",
     "Topology",
     "Trace",
     "from_trimesh",
@@ -35,6 +40,7 @@ __all__ = [
     "neighbors",
     "ray_scene",
     "read_mesh",
+    "texels",
     "to_trimesh",
     "topology",
     "trace",

@@ -1,9 +1,12 @@
 """Shapes with known answers, for the tests of geometry."""
 
+import dataclasses
+
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsh.geometry import _cast
+from jaxsh.geometry import Mesh, _cast, make_mesh
 
 TETRAHEDRON = (
     np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32),
@@ -13,6 +16,13 @@ QUAD = (  # the unit square in z = 0, facing +z
     np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32),
     np.array([[0, 1, 2], [0, 2, 3]], np.int32),
 )
+
+
+def square(scale=(1.0, 1.0), offset=(0.0, 0.0)) -> Mesh:
+    """The unit square whose UV are x and y, scaled and moved."""
+    mesh = make_mesh(*QUAD)
+    uv = QUAD[0][:, :2] * np.asarray(scale, np.float32) + np.asarray(offset, np.float32)
+    return dataclasses.replace(mesh, uv=jnp.asarray(uv))
 
 
 def small_chunks():

@@ -1,11 +1,14 @@
 """Rays and normals on a mesh of devices; what runs on the host takes shared arrays too."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from jax.sharding import AxisType, NamedSharding
 from jax.sharding import PartitionSpec as P
+from shapes import square
 from sharding import ROWS, WHOLE, check_sharded, collectives
 
 from jaxsh import geometry
@@ -31,6 +34,12 @@ def test_trace_keeps_the_sharding_of_rays(scene, rng):
     specs = (*[WHOLE] * len(scene.tree), ROWS, ROWS, ROWS)
     arguments = *scene.tree, origins, directions, limits
     check_sharded(cast, arguments, specs, (ROWS, ROWS, ROWS), exchange=STEPS)
+
+
+@pytest.fixture(scope="module")
+def held():
+    """The unit square on 12 of 6 × 4 texels, with 4 in its gutter."""
+    return geometry.texels(square(scale=(0.5, 1.0)), (6, 4), gutter=1)
 
 
 @pytest.mark.slow
@@ -103,3 +112,40 @@ def test_what_runs_on_the_host_takes_shared_arrays(scene, rng):
     placed = jax.device_put(rays, NamedSharding(mesh, P(None, "rows")))
     for one, other in zip(scene.closest_hit(*placed), scene.closest_hit(*rays), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_carry_keeps_the_sharding_of_texels(held, rng):
+    values = rng.normal(size=(len(held.mesh.vertices), 2)).astype(np.float32)
+
+    def carry(face, barycentric, values):
+        shared = dataclasses.replace(held, face=face, barycentric=barycentric)
+        return shared.carry(values)
+
+    check_sharded(carry, (held.face, held.barycentric, values), (ROWS, ROWS, WHOLE), ROWS)
+
+
+def test_images_keep_the_rows_of_the_picture(held, rng):
+    values = rng.normal(size=(held.num_points, 2)).astype(np.float32)
+
+    def image(source, values):
+        return dataclasses.replace(held, source=source).image(values, 0.5)
+
+    check_sharded(image, (held.source, values), (ROWS, WHOLE), ROWS)
+
+
+@pytest.mark.parametrize("kind", [AxisType.Auto, AxisType.Explicit])
+def test_values_shared_out_by_texel_make_a_whole_picture(held, kind):
+    """As after a bake and shading whose rows are shared out."""
+    mesh = jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+    shared = jax.device_put(held.positions, NamedSharding(mesh, ROWS))
+
+    def loss(values):
+        image = held.image(values)
+        return jnp.sum(image**2), image
+
+    step = jax.jit(jax.value_and_grad(loss, has_aux=True))
+    (_, image), gradient = step(shared)
+    (_, whole), expected = step(held.positions)
+    np.testing.assert_array_equal(image, whole)
+    np.testing.assert_allclose(gradient, expected, rtol=0, atol=1e-6)
+    assert image.sharding.is_fully_replicated

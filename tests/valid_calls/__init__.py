@@ -55,7 +55,7 @@ MADE = {
         "SkyLight",
         "Statistics",
     },
-    "geometry": {"BaseColor", "Hit", "Mesh", "RayScene", "RayTree", "Topology", "Trace"},
+    "geometry": {"BaseColor", "Hit", "Mesh", "RayScene", "RayTree", "Texels", "Topology", "Trace"},
     "imaging": {"Raster"},
     "midrange": {"Update", "Weights"},
     "sky": {"Axis", "FitError", "PreethamConstants", "SkyFit", "SkyWarning", "Solution"},

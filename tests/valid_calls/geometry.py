@@ -1,10 +1,19 @@
 """Valid calls of `jaxsh.geometry`."""
 
+import dataclasses
+
 import numpy as np
 
 from jaxsh import geometry
 
 from .shared import floats, knot, of
+
+
+def square_texels() -> geometry.Texels:
+    """The unit square on 3 × 2 texels."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    square = geometry.make_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+    return geometry.texels(dataclasses.replace(square, uv=square.vertices[:, :2]), (3, 2))
 
 
 def calls():
@@ -16,9 +25,18 @@ def calls():
     }
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     scene = g.JaxRayScene(mesh)
+    held = square_texels()
     made = {"normals": "smooth", "origin": (0.0, 0.0, 0.0), "two_sided": True}
     return {
         "EmbreeRayScene": of(g.EmbreeRayScene, meshes=[mesh], threads=1, slow=True),
+        "Points": of(
+            g.Points,
+            positions=floats(4, 3),
+            normals=np.repeat([[0.0, 0.6, 0.8]], 4, axis=0),
+            finite="positions normals",
+        ),
+        "Texels.carry": of(held.carry, values=floats(4, 2)),
+        "Texels.image": of(held.image, values=floats(6, 3), background=0.5),
         "JaxRayScene": of(g.JaxRayScene, meshes=[mesh], slow=True),
         "JaxRayScene.closest_hit": of(scene.closest_hit, **rays, slow=True),
         "JaxRayScene.occluded": of(scene.occluded, **rays, max_distance=3.0, slow=True),
@@ -40,6 +58,7 @@ def calls():
         "read_mesh": of(
             g.read_mesh, **file, colors="srgb", **made, free="path normals origin", slow=True
         ),
+        "texels": of(g.texels, mesh=held.mesh, resolution=4, gutter=1, unwrap=False, host=True),
         "topology": of(g.topology, mesh=mesh, host=True),
         "trace": of(
             g.trace, tree=scene.tree, **rays, max_distance=3.0, first=True, count=None, lanes=8
