@@ -6,6 +6,7 @@ numbers differentiates; what touches files or casts rays does not.
 """
 
 from ._backdrop import backdrop, look_up
+from ._base_color import base_color
 from ._camera import Camera
 from ._display import auto_exposure, psnr, srgb_decode, srgb_encode, tone_map
 from ._environment import read_environment, studio
@@ -14,6 +15,7 @@ from ._movie import write_movie
 from ._raster import Raster, interpolate, rasterize
 from ._relit import write_relit
 from ._splats import Splats, read_splats, write_splats
+from ._texture import sample_texture
 from ._write import write_image
 
 __all__ = [
@@ -22,6 +24,7 @@ __all__ = [
     "Splats",
     "auto_exposure",
     "backdrop",
+    "base_color",
     "interpolate",
     "look_up",
     "psnr",
@@ -29,6 +32,7 @@ __all__ = [
     "read_environment",
     "read_light",
     "read_splats",
+    "sample_texture",
     "srgb_decode",
     "srgb_encode",
     "studio",

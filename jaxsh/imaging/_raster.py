@@ -22,7 +22,8 @@ class Raster(eqx.Module):
     """Holds what the samples of each pixel see of a mesh: n × n of them, for a picture of h × w.
 
     With one sample, its pixel's center, the rows and columns are those of the picture. Made by
-    `rasterize`, drawn with `interpolate`.
+    `rasterize`, drawn with `interpolate`. Of a mesh with UV it holds those of each sample, and its
+    footprint, for `sample_texture`.
 
     **Example**
 
@@ -37,6 +38,10 @@ class Raster(eqx.Module):
     barycentric: Float[Array, "hn wn 3"]  # of the face's vertices, 0 for background; float32
     faces: Int[Array, "f 3"]  # the mesh's
     samples: int = eqx.field(static=True, default=1)  # n
+    # Of a mesh with UV, 0 for background: where in the texture the samples are, and by how much
+    # (u, v) changes to the next sample to the right and the next one down, in its columns.
+    uv: Float[Array, "hn wn 2"] | None = None
+    footprint: Float[Array, "hn wn 2 2"] | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -62,8 +67,9 @@ def rasterize(
 
     `samples` rays along each side of a pixel, on a regular grid: one is its center, n give pictures
     n² + 1 shades of a silhouette and take n² times the memory. Exact at the samples (weights are
-    those in space, so perspective is right). Frame after frame of a mesh at rest, give its
-    `geometry.ray_scene(mesh)` as `scene`, so that its tree is built once.
+    those in space, so perspective is right), the UV and its footprint too: the derivative, in the
+    picture's plane, of where on the face a ray arrives. Frame after frame of a mesh at rest, give
+    its `geometry.ray_scene(mesh)` as `scene`, so that its tree is built once.
 
     Runs on the host through a `RayScene`, outside `jit`, and does not shard. Not differentiable:
     which face is seen is a step. Raises `ValueError` for samples below 1.
@@ -86,29 +92,34 @@ def rasterize(
     finer = dataclasses.replace(camera, height=shape[0], width=shape[1])
     scene = ray_scene(mesh) if scene is None else scene
     hit = scene.closest_hit(*_rays(finer))
-    return Raster(
-        jnp.asarray(hit.face.reshape(shape)),
-        jnp.asarray(hit.barycentric.reshape(*shape, 3)),
-        jnp.asarray(mesh.faces),
-        samples,
-    )
+    face = jnp.asarray(hit.face.reshape(shape))
+    barycentric = jnp.asarray(hit.barycentric.reshape(*shape, 3))
+    uv, footprint = (None, None)
+    if mesh.uv is not None:
+        uv, footprint = _in_texture(mesh.vertices, mesh.faces, mesh.uv, face, barycentric, finer)
+    return Raster(face, barycentric, jnp.asarray(mesh.faces), samples, uv, footprint)
 
 
 def interpolate(
     raster: Raster,
     values: Float[Array, "v c"],
     background: float | Float[Array, " c"] | Float[Array, "h w c"] = 0.0,
+    *,
+    color: Float[Array, "hn wn c"] | None = None,
 ) -> Float[Array, "h w c"]:
     """Carry values at vertices (colors, positions, normals) linearly over the faces to pixels.
 
     A pixel is the mean over its samples; those beside the object count as `background`, a number,
     a color or a picture (as from `backdrop`). Give linear radiance: the mean of encoded colors is
-    not the color of the mean light. Has the dtype of `values`. Raises `ValueError` for values of
-    another shape or of too few vertices, and for a background of another shape.
+    not the color of the mean light. `color`, one for each of the raster's samples, as `base_color`
+    and `sample_texture` give it, is multiplied into the values there, before the mean: a texture
+    may be finer than the mesh. Has the dtype of `values`. Raises `ValueError` for values of
+    another shape or of too few vertices, and for a background or color of another shape.
 
-    Differentiable, forward and reverse, in `values`, `background` and the raster's weights. Runs
-    under `jit` and `vmap`. Shards over the raster's rows, where `values` are whole on each device;
-    values that are shared out by vertex are brought together for a picture whole on each device.
+    Differentiable, forward and reverse, in `values`, `background`, `color` and the raster's
+    weights. Runs under `jit` and `vmap`. Shards over the raster's rows, where `values` are whole on
+    each device; values that are shared out by vertex are brought together for a picture whole on
+    each device.
 
     **Example**
 
@@ -133,7 +144,14 @@ def interpolate(
         raise ValueError(
             f"expected background as a number, {shape[2:]} or {shape}, got shape {behind.shape}"
         )
-    return _interpolate(raster, values, behind)
+    if color is not None:
+        color = as_float(color, "color").astype(values.dtype)
+        if color.shape != (*raster.face.shape, values.shape[1]):
+            raise ValueError(
+                f"expected color {(*raster.face.shape, values.shape[1])}, one for each sample of "
+                f"the raster, got shape {color.shape}"
+            )
+    return _interpolate(raster, values, behind, color)
 
 
 @functools.partial(jax.jit, static_argnums=1)
@@ -143,12 +161,13 @@ def _alpha(face: Int[Array, "hn wn"], samples: int) -> Float[Array, "h w"]:
 
 
 @jax.jit
-def _interpolate(raster: Raster, values, background):
-    def pixels(raster: Raster, values, background):
+def _interpolate(raster: Raster, values, background, color):
+    def pixels(raster: Raster, values, background, color):
         # The background's -1 would be the last face, but its weights are zero.
         corners = values[raster.faces[jnp.maximum(raster.face, 0)]]
         weights = raster.barycentric.astype(values.dtype)
         seen = einsum("hwkc,hwk->hwc", corners, weights)
+        seen = seen if color is None else seen * color
         seen = jnp.where((raster.face >= 0)[..., None], seen, 0)
         seen = _resolve(seen, raster.samples)
         free = 1 - raster.alpha[..., None].astype(values.dtype)
@@ -156,11 +175,48 @@ def _interpolate(raster: Raster, values, background):
         return seen + jnp.where(free > 0, free * jnp.broadcast_to(background, seen.shape), 0)
 
     if rows_are_split(raster.face):
-        return keep_rows(pixels, raster, values, background, like=raster.face, axis=0, out=0)
-    return keep_rows(pixels, raster, values, background, like=values, axis=0, out=None)
+        return keep_rows(pixels, raster, values, background, color, like=raster.face, axis=0, out=0)
+    return keep_rows(pixels, raster, values, background, color, like=values, axis=0, out=None)
 
 
 def _resolve(samples: Float[Array, "hn wn c"], n: int) -> Float[Array, "h w c"]:
     """Average each n × n samples."""
     height, width, channels = samples.shape
     return jnp.mean(samples.reshape(height // n, n, width // n, n, channels), axis=(1, 3))
+
+
+@jax.jit
+def _in_texture(vertices, faces, uv, face, barycentric, camera: Camera):
+    """UV of each sample, and their change to the next samples to the right and down."""
+    seen = face >= 0
+    at = faces[jnp.maximum(face, 0)]
+    corners = vertices[at]
+    weights = barycentric.astype(vertices.dtype)
+    point = einsum("hwkc,hwk->hwc", corners, weights)
+    first, second = corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
+    across = jnp.cross(first, second)
+    squared = jnp.sum(across * across, axis=-1)
+    # The ray at x, y of the picture is o + t (x right + y upward + forward), t its depth. A step
+    # in x moves the point by t right, and then along the ray back into the plane of the face.
+    right, upward, forward = (axis.astype(vertices.dtype) for axis in camera._axes())
+    ray = point - camera.position.astype(vertices.dtype)[None, None]
+    depth = einsum("hwc,c->hw", ray, forward)
+    facing = jnp.sum(ray * across, axis=-1)
+    # A face seen from its edge has no end of a footprint; no ray arrives there but by rounding.
+    usable = seen & (squared > 0) & (facing != 0)
+    squared, facing = (jnp.where(usable, x, 1)[..., None] for x in (squared, facing))
+    tall = 2 * jnp.tan(jnp.radians(jnp.asarray(camera.fov_y, vertices.dtype)) / 2)
+    step = tall / camera.height  # pixels are square
+    texture = uv[at]
+    edges = texture[..., 1:, :] - texture[..., :1, :]
+    columns = []
+    for axis in (right, -upward):
+        move = (depth * step)[..., None] * axis[None, None]
+        move = move - ray * (jnp.sum(move * across, axis=-1, keepdims=True) / facing)
+        # Barycentric coordinates of the move, by the normal's cross products with the edges.
+        b = jnp.sum(jnp.cross(move, second) * across, axis=-1, keepdims=True) / squared
+        c = jnp.sum(jnp.cross(first, move) * across, axis=-1, keepdims=True) / squared
+        change = b.astype(uv.dtype) * edges[..., 0, :] + c.astype(uv.dtype) * edges[..., 1, :]
+        columns.append(jnp.where(usable[..., None], change, 0))
+    place = einsum("hwkc,hwk->hwc", texture, barycentric.astype(uv.dtype))
+    return jnp.where(seen[..., None], place, 0), jnp.stack(columns, axis=-1)

@@ -81,6 +81,32 @@ def test_look_up_keeps_the_sharding_of_directions(rng):
     check_sharded(gradient, (directions, environment), (ROWS, WHOLE), ROWS)
 
 
+def test_textures_keep_the_sharding_of_coordinates(rng):
+    texture = rng.uniform(size=(4, 6, 3)).astype(np.float32)
+    uv = rng.uniform(-1, 2, size=(8, 2)).astype(np.float32)
+    footprint = rng.normal(size=(8, 2, 2)).astype(np.float32)
+    arguments, specs = (texture, uv, footprint), (WHOLE, ROWS, ROWS)
+    check_sharded(imaging.sample_texture, arguments, specs, ROWS)
+    gradient = jax.grad(lambda uv, t, f: jnp.sum(imaging.sample_texture(t, uv, f) ** 2))
+    check_sharded(gradient, (uv, texture, footprint), (ROWS, WHOLE, ROWS), ROWS)
+
+
+def test_base_color_keeps_the_rows_of_the_raster(scene, rng):
+    mesh, raster = scene
+    codes = rng.integers(0, 256, size=(4, 6, 4), dtype=np.uint8)
+    chosen = np.zeros(len(mesh.faces), np.int32)
+    part = geometry.BaseColor(texture=codes)
+    uv = rng.uniform(size=(300, 2)).astype(np.float32)
+    footprint = rng.normal(size=(*raster[0].shape, 2, 2)).astype(np.float32)
+
+    def color(vertices, uv, chosen, face, barycentric, faces, footprint):
+        mesh = geometry.Mesh(vertices, faces, vertices, uv, None, chosen, (part,))
+        return imaging.base_color(mesh, Raster(face, barycentric, faces, 2, footprint=footprint))
+
+    specs = (WHOLE, WHOLE, WHOLE, ROWS, ROWS, WHOLE, ROWS)
+    check_sharded(color, (mesh.vertices, uv, chosen, *raster, footprint), specs, ROWS)
+
+
 @pytest.mark.parametrize("curve", ["clip", "reinhard"])
 def test_tone_curves_keep_the_rows_of_a_picture(rng, curve):
     image = rng.uniform(0, 4, size=(8, 6, 3)).astype(np.float32)

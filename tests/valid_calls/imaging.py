@@ -48,8 +48,13 @@ def calls():
             i.auto_exposure, image=image, mask=image[..., 0] > 0.5, percentile=90.0
         ),
         "backdrop": of(i.backdrop, environment=image, camera=camera),
+        "base_color": of(i.base_color, mesh=mesh, at=raster),
         "interpolate": of(
-            i.interpolate, raster=raster, values=floats(300, 3), background=floats(3)
+            i.interpolate,
+            raster=raster,
+            values=floats(300, 3),
+            background=floats(3),
+            color=floats(8, 6, 3),
         ),
         "look_up": of(i.look_up, environment=image, directions=floats(4, 3)),
         "psnr": of(i.psnr, image=image, reference=image, mask=image[..., 0] > 0.5, peak=1.0),
@@ -83,6 +88,13 @@ def calls():
             slow=True,
         ),
         "read_splats": of(i.read_splats, path="no such file.ply", up="y", slow=True),
+        "sample_texture": of(
+            i.sample_texture,
+            texture=image,
+            uv=floats(4, 2),
+            footprint=floats(4, 2, 2),
+            wrap="clamp",
+        ),
         "srgb_decode": of(i.srgb_decode, signal=image),
         "srgb_encode": of(i.srgb_encode, linear=image),
         "studio": of(i.studio, height=8, width=16),

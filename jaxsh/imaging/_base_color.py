@@ -1,0 +1,177 @@
+"""The base color of a mesh where it is wanted: at its vertices, at what a camera sees."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from .._core.checks import at_hand, check_type
+from .._core.linalg import einsum
+from .._core.xla import keep_rows
+from ..geometry import BaseColor, Mesh
+from ._display import srgb_decode
+from ._raster import Raster
+from ._texture import Pyramid, longer_step, pyramid, sample
+
+
+def base_color(mesh: Mesh, at: Raster | None = None) -> Float[Array, "*shape 3"]:
+    """Compute the base color of a mesh: factor times texture times color of the vertices.
+
+    The albedo of its surface, linear RGB, in the dtype of the vertices; alpha is left out, since
+    surfaces are read as whole. Faces without a material count as white, and so do vertices without
+    a color. Textures are repeated beyond [0, 1], and filtered as `sample_texture` does with a
+    footprint: nothing finer than the places where it is wanted flickers.
+
+    - `at`: where. None: at the vertices (v, 3), the mean over the faces around, each with the mean
+      of its texture over an area as large as the face's cell. A `Raster` of this mesh: at each of
+      its samples (height·n, width·n, 3), 0 for background, as `interpolate` takes it for `color`.
+
+    Raises `ValueError` where a texture has no UV to go by, materials do not say which faces they
+    are of or a raster is of another mesh, and `TypeError` for anything else in `at`.
+
+    Differentiable in factors, colors of the vertices and UV; not in textures, which are 8-bit
+    codes: to fit one, decode it and use `sample_texture`. Runs under `jit`. Shards over the
+    raster's rows, where the mesh is whole on each device. All textures are decoded together, to
+    16 bytes a texel.
+
+    **Example**
+
+    >>> import jax.numpy as jnp
+    >>> from jaxsh import geometry, imaging
+    >>> mesh = geometry.knot(300)
+    >>> raster = imaging.rasterize(mesh, imaging.Camera.facing(mesh, width=8, height=6))
+    >>> imaging.base_color(mesh).shape, imaging.base_color(mesh, raster).shape
+    ((300, 3), (6, 8, 3))
+    """
+    check_type("mesh", mesh, Mesh)
+    if at is not None:
+        check_type("at", at, Raster)
+    _check_materials(mesh)
+    if at is None:
+        return _at_vertices(mesh)
+    _check_faces(mesh, at.faces, "raster")
+    return _at_samples(mesh, at)
+
+
+def _check_materials(mesh: Mesh) -> None:
+    textured = any(material.texture is not None for material in mesh.materials)
+    if textured and mesh.uv is None:
+        raise ValueError(
+            "a material of the mesh has a texture, but the mesh has no UV to look it up by"
+        )
+    if not mesh.materials:
+        return
+    if mesh.face_material is None:
+        raise ValueError(
+            f"the mesh has {len(mesh.materials)} materials, but no face_material that says which "
+            "faces they are of"
+        )
+    if at_hand(jnp.asarray(mesh.face_material)):
+        rows = np.asarray(mesh.face_material)
+        if rows.size and not -1 <= rows.min() <= rows.max() < len(mesh.materials):
+            raise ValueError(
+                f"face_material of the mesh names materials {rows.min()} to {rows.max()}, but it "
+                f"has 0 to {len(mesh.materials) - 1}"
+            )
+
+
+def _check_faces(mesh: Mesh, faces: Int[Array, "f 3"], what: str) -> None:
+    ours = jnp.asarray(mesh.faces)
+    same = ours.shape == faces.shape
+    if same and ours is not faces and at_hand(ours) and at_hand(faces):
+        same = np.array_equal(ours, faces)
+    if not same:
+        raise ValueError(
+            f"expected a {what} of this mesh, with its {len(ours)} faces, got one of another mesh "
+            f"with {len(faces)}"
+        )
+
+
+class _Surface(NamedTuple):
+    """Holds factors and textures of a mesh's materials, the last row for faces that have none."""
+
+    factor: Float[Array, "m 3"]
+    textures: Pyramid | None
+    picture: Int[Array, " m"]  # which texture
+
+
+def _surface(mesh: Mesh) -> _Surface:
+    dtype = mesh.vertices.dtype
+    pictures: list[Array] = [jnp.ones((1, 1, 3), dtype)]
+    factors, chosen = [], []
+    for material in (*mesh.materials, BaseColor()):
+        factors.append(jnp.stack([jnp.asarray(x, dtype) for x in material.factor[:3]]))
+        chosen.append(0 if material.texture is None else len(pictures))
+        if material.texture is not None:
+            codes = jnp.asarray(material.texture)[..., :3]
+            pictures.append(srgb_decode(codes.astype(dtype) / 255))
+    textures = pyramid(pictures, levels=True) if len(pictures) > 1 else None
+    return _Surface(jnp.stack(factors), textures, jnp.asarray(chosen))
+
+
+def _material(mesh: Mesh, face: Int[Array, "*shape"]) -> Int[Array, "*shape"]:
+    """The row of `_Surface` that a face has."""
+    if mesh.face_material is None or not mesh.materials:
+        return jnp.full_like(face, len(mesh.materials))
+    row = jnp.asarray(mesh.face_material)[face]
+    return jnp.where(row < 0, len(mesh.materials), row)
+
+
+@jax.jit
+def _at_samples(mesh: Mesh, raster: Raster):
+    def samples(mesh: Mesh, raster: Raster):
+        seen = raster.face >= 0
+        face = jnp.maximum(raster.face, 0)
+        found = _colors(mesh, face, raster.barycentric, raster.footprint)
+        return jnp.where(seen[..., None], found, 0)
+
+    return keep_rows(samples, mesh, raster, like=raster.face, axis=0, out=0)
+
+
+def _colors(mesh: Mesh, face, barycentric, footprint):
+    """Base color at places on faces."""
+    surface = _surface(mesh)
+    material = _material(mesh, face)
+    color = surface.factor[material]
+    at = jnp.asarray(mesh.faces)[face]
+    weights = barycentric.astype(color.dtype)
+    if surface.textures is not None:
+        assert mesh.uv is not None
+        uv = einsum("...kc,...k->...c", mesh.uv[at], weights.astype(mesh.uv.dtype))
+        picture = surface.picture[material]
+        squared = None
+        if footprint is not None:
+            squared = longer_step(footprint, *_sizes(surface.textures, picture))
+        color = color * sample(surface.textures, picture, uv, squared, "repeat")
+    if mesh.colors is not None:
+        color = color * einsum("...kc,...k->...c", mesh.colors[at][..., :3], weights)
+    return color
+
+
+@jax.jit
+def _at_vertices(mesh: Mesh):
+    surface = _surface(mesh)
+    faces = jnp.asarray(mesh.faces)
+    material = _material(mesh, jnp.arange(len(faces)))
+    color = jnp.broadcast_to(surface.factor[material][:, None], (*faces.shape, 3))
+    if surface.textures is not None:
+        assert mesh.uv is not None
+        uv = mesh.uv[faces]
+        picture = surface.picture[material]
+        height, width = (n.astype(uv.dtype) for n in _sizes(surface.textures, picture))
+        # A vertex stands for a third of each face around it, about two faces in all.
+        (a, b), (c, d) = jnp.moveaxis(uv[:, 1:] - uv[:, :1], 0, -1)
+        squared = jnp.abs(a * d - b * c) * height * width
+        picture, squared = (jnp.broadcast_to(x[:, None], faces.shape) for x in (picture, squared))
+        color = color * sample(surface.textures, picture, uv, squared, "repeat")
+    total = jnp.zeros_like(mesh.vertices).at[faces].add(color)
+    count = jnp.zeros_like(mesh.vertices[:, :1]).at[faces].add(1)
+    mean = jnp.where(count > 0, total / jnp.maximum(count, 1), 1)
+    return mean if mesh.colors is None else mean * mesh.colors[:, :3].astype(mean.dtype)
+
+
+def _sizes(textures: Pyramid, picture):
+    """Height and width of textures."""
+    return (jnp.asarray(n[textures.first])[picture] for n in (textures.height, textures.width))
