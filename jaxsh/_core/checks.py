@@ -292,6 +292,15 @@ def check_number(
     return number
 
 
+def check_cosine(transfer: Any) -> None:
+    """Raises `ValueError` for the transfer of points without normals, which no surface shades."""
+    if not transfer.cosine:
+        raise ValueError(
+            "expected a transfer with the cosine of a surface, got that of points without normals, "
+            "which transfer.fluence takes"
+        )
+
+
 def align(*arrays: Array) -> tuple[Array, ...]:
     """Leading axes of length 1 for those of lower rank, so that batches broadcast.
 

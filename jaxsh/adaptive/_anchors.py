@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import align, check_degree, check_flag, check_number, check_type
+from .._core.checks import align, check_cosine, check_degree, check_flag, check_number, check_type
 from .._core.xla import materialize
 from ..transfer import (
     AbstractTransfer,
@@ -150,6 +150,7 @@ def make_anchors(
     from scipy.spatial import KDTree
 
     check_type("transfer", transfer, Transfer)
+    check_cosine(transfer)
     quantized = check_flag("quantized", quantized)
     check_one_device("make_anchors", transfer)
     check_known("make_anchors", transfer)

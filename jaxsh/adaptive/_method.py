@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_options, check_type, is_concrete
+from .._core.checks import as_float, check_cosine, check_options, check_type, is_concrete
 from .._core.xla import on_mesh
 from ..harmonics import degree_of
 from ..transfer import AbstractTransfer, Material, Transfer
@@ -48,6 +48,7 @@ class AbstractMethod(eqx.Module):
 def checked_frame(light, transfer: AbstractTransfer, eye, material: Material):
     """Casts light, eye and material to the transfer's dtype; one light of degree 2 or above."""
     check_type("transfer", transfer, AbstractTransfer)
+    check_cosine(transfer)
     count, dtype = transfer.num_points, transfer.dtype
     light = checked_one_light(light, count, transfer.degree, dtype)
     if degree_of(light.shape[-1]) < 2:

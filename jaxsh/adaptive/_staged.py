@@ -1,13 +1,14 @@
 """Transfer at several degrees, each as values in directions, for methods that recompute."""
 
 import functools
+from typing import Literal
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Int8
 
-from .._core.checks import check_degree, check_flag, check_type
+from .._core.checks import check_cosine, check_degree, check_flag, check_type
 from .._core.linalg import matmul, shading_tall_product
 from .._core.xla import materialize
 from ..harmonics import degree_of
@@ -50,6 +51,10 @@ class StagedTransfer(AbstractTransfer):
     middle: SampledTransfer
     rows: SampledRows
     target: int = eqx.field(static=True)  # degree of the lights to come
+    surface: Literal["vertices", "points", "texels"] = eqx.field(
+        static=True, default="vertices", kw_only=True
+    )
+    cosine: bool = eqx.field(static=True, default=True, kw_only=True)
 
     @property
     def num_points(self) -> int:
@@ -106,6 +111,7 @@ def stage(
     (1, 2, 4)
     """
     check_type("transfer", transfer, Transfer)
+    check_cosine(transfer)
     quantized = check_flag("quantized", quantized)
     degree = transfer.degree if degree is None else check_degree(degree)
     base = check_degree(base, "base")
@@ -124,6 +130,7 @@ def stage(
         sample(transfer, middle),
         sample_rows(transfer.coefficients, degree, quantized),
         degree,
+        surface=transfer.surface,
     )
 
 

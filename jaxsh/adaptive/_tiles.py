@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int, Int8
 
-from .._core.checks import check_flag, check_size, check_type
+from .._core.checks import check_cosine, check_flag, check_size, check_type
 from .._core.linalg import matmul
 from .._core.xla import equal_blocks, materialize
 from ..harmonics import degree_of, phong
@@ -204,6 +204,7 @@ def arrange(
     """
     check_rule(directions, exponent)
     check_type("transfer", transfer, Transfer)
+    check_cosine(transfer)
     check_type("tiling", tiling, Tiling)
     quantized = check_flag("quantized", quantized)
     check_one_device("arrange", transfer)

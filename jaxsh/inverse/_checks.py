@@ -6,6 +6,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import (
     as_float,
+    check_cosine,
     check_flag,
     check_number,
     check_size,
@@ -33,6 +34,7 @@ def check_data(
     are not finite, all zero, or weighted by less than 0.
     """
     check_type("transfer", transfer, Transfer)
+    check_cosine(transfer)
     dtype, count = transfer.coefficients.dtype, len(transfer.coefficients)
     observed = as_float(observed, "observed").astype(dtype)
     albedo = checked_albedo(albedo, count, dtype)

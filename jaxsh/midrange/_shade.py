@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, check_choice, check_type
+from .._core.checks import align, check_choice, check_cosine, check_type
 from .._core.linalg import shading_matmul
 from ..transfer import Transfer
 from ..transfer._glossy_kernels import checked_albedo
@@ -62,6 +62,7 @@ def shade(
     check_choice("rule", rule, get_args(Rule))
     check_type("expansions", expansions, Expansion)
     check_type("transfer", transfer, Transfer)
+    check_cosine(transfer)
     if weights is not None:
         check_type("weights", weights, Weights)
     count = len(transfer.coefficients)

@@ -8,6 +8,7 @@ from ._bake import bake, bake_on
 from ._file import load, save
 from ._fixed_light import FixedLight, fixed_light
 from ._fixed_view import FixedView, fixed_view
+from ._fluence import fluence
 from ._forms import QuantizedTransfer, SampledTransfer, quantize, sample
 from ._material import Material
 from ._shade import reflected_direction, shade_diffuse, shade_glossy
@@ -32,6 +33,7 @@ __all__ = [
     "bake_on",
     "fixed_light",
     "fixed_view",
+    "fluence",
     "load",
     "open",
     "quantize",

@@ -3,19 +3,21 @@
 import os
 import zipfile
 from pathlib import Path
+from typing import Any, get_args
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._core.checks import as_path, check_type
+from .._core.checks import as_path, check_choice, check_type
 from .._core.files import check_place, put_in_place
 from .._core.npy import from_npz, text_of
 from .._core.words import reason
 from ..harmonics import degree_of
-from ._transfer import Transfer
+from ._transfer import SurfaceKind, Transfer
 
-_FORMAT, _VERSION = "jaxsh transfer", 1
+# Version 1 holds vertices with the cosine, and is what those are written as; 2 holds any points.
+_FORMAT, _VERSIONS = "jaxsh transfer", (1, 2)
 _NONE = np.array(0)
 _FIELDS = {"coefficients": "f", "positions": "f", "normals": "f", "neighbors": "i"}
 
@@ -44,7 +46,10 @@ def save(path: str | os.PathLike[str], transfer: Transfer) -> Path:
     if problem := _problem(arrays):
         raise ValueError(f"{path}: cannot be written: {problem}")
     check_place(path)
-    labels = {"format": np.array(_FORMAT), "version": np.array(_VERSION)}
+    plain = transfer.surface == "vertices" and transfer.cosine
+    labels = {"format": np.array(_FORMAT), "version": np.array(_VERSIONS[0 if plain else 1])}
+    if not plain:
+        labels |= {"surface": np.array(transfer.surface), "cosine": np.array(transfer.cosine)}
     put_in_place({path: lambda file: np.savez(file, allow_pickle=False, **labels, **arrays)})
     return path
 
@@ -74,21 +79,37 @@ def load(path: str | os.PathLike[str]) -> Transfer:
     if not zipfile.is_zipfile(path):
         raise ValueError(f"{path}: not a transfer file, or a truncated one")
     try:
-        arrays = from_npz(path, ["format", "version", *_FIELDS])
+        arrays = from_npz(path, ["format", "version", "surface", "cosine", *_FIELDS])
         kind, version = text_of(arrays.pop("format", _NONE)), arrays.pop("version", _NONE)
         written = reason(text_of(version), 40)
     except Exception as error:  # a damaged archive may raise anything
         raise ValueError(f"{path}: damaged: {reason(error)}") from error
     if kind != _FORMAT:
         raise ValueError(f"{path}: not a transfer file")
-    if version.shape or version.dtype.kind != "i" or version != _VERSION:
-        raise ValueError(f"{path}: written as version {written}, but this jaxsh reads {_VERSION}")
+    if version.shape or version.dtype.kind != "i" or version not in _VERSIONS:
+        raise ValueError(
+            f"{path}: written as version {written}, but this jaxsh reads 1 and {_VERSIONS[-1]}"
+        )
+    about = {name: arrays.pop(name, _NONE) for name in ("surface", "cosine")}
+    kind = {} if version == 1 else _kind(path, **about)
     # As read, and once more in JAX's types: float32 cannot hold all that float64 can.
     for change in (lambda array: array, _in_jax_types):
         arrays = {name: change(array) for name, array in arrays.items()}
         if problem := _problem(arrays):
             raise ValueError(f"{path}: damaged: {problem}")
-    return Transfer(**{name: jnp.asarray(arrays[name]) for name in _FIELDS})
+    return Transfer(**{name: jnp.asarray(arrays[name]) for name in _FIELDS}, **kind)
+
+
+def _kind(path: Path, surface: np.ndarray, cosine: np.ndarray) -> dict[str, Any]:
+    """Give what a file says of the points that its rows are."""
+    try:
+        said = text_of(surface)
+        check_choice("surface", said, get_args(SurfaceKind))
+        if cosine.shape or cosine.dtype != bool:
+            raise ValueError(f"cosine has dtype {cosine.dtype} and shape {cosine.shape}")
+    except Exception as error:  # a text that is none may raise anything
+        raise ValueError(f"{path}: damaged: {reason(error)}") from error
+    return {"surface": said, "cosine": bool(cosine)}
 
 
 def _in_jax_types(array: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, check_flag, check_type
+from .._core.checks import align, check_cosine, check_flag, check_type
 from .._core.linalg import matmul
 from .._core.xla import on_mesh
 from ..harmonics import convolve, degree_of, evaluate, num_coefficients, phong, product_matrix
@@ -85,6 +85,7 @@ def fixed_light(light: Float[ArrayLike, "3 k"], transfer: Transfer) -> FixedLigh
     (1, 3)
     """
     check_type("transfer", transfer, Transfer)
+    check_cosine(transfer)
     light = checked_one_light(light, transfer.num_points, transfer.degree, transfer.dtype)
     return _fixed_light(light, transfer)
 

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_finite, check_flag, check_type
+from .._core.checks import as_finite, check_cosine, check_flag, check_type
 from .._core.linalg import in_full, shading_tall_product
 from ..harmonics import degree_of, num_coefficients
 from ._glossy_kernels import lobe_polynomial, lobe_products
@@ -94,6 +94,7 @@ def fixed_view(
     (1, 3)
     """
     check_type("transfer", transfer, Transfer)
+    check_cosine(transfer)
     distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
     count, dtype = transfer.num_points, transfer.dtype
     eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)

@@ -1,5 +1,6 @@
 """Other forms of a transfer: its values in directions, and eight bits."""
 
+import dataclasses
 import functools
 
 import equinox as eqx
@@ -13,7 +14,7 @@ from .._core.linalg import matmul
 from .._core.xla import materialize, on_mesh
 from ..harmonics import degree_of, num_coefficients
 from ._glossy_kernels import block_sums, in_steps, mirrored, node_passes, rows_of
-from ._transfer import AbstractTransfer, Transfer, checked_degree, irradiances
+from ._transfer import AbstractTransfer, SurfaceKind, Transfer, checked_degree, irradiances
 
 # Vertices side by side: a block's coefficients stay in the first cache.
 _BLOCK = 128
@@ -40,6 +41,8 @@ class SampledTransfer(AbstractTransfer):
     coefficients: Float[Array, "v k"]
     positions: Float[Array, "3 v"]
     normals: Float[Array, "3 v"]  # at unit length
+    surface: SurfaceKind = eqx.field(static=True, default="vertices", kw_only=True)
+    cosine: bool = eqx.field(static=True, default=True, kw_only=True)
 
     @property
     def degree(self) -> int:
@@ -62,6 +65,8 @@ class SampledTransfer(AbstractTransfer):
             share(self.coefficients, mesh),
             share(self.positions, mesh, axis=1, filling=last_of(self.positions.T)),
             share(self.normals, mesh, axis=1),
+            surface=self.surface,
+            cosine=self.cosine,
         )
 
     def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
@@ -110,6 +115,8 @@ class QuantizedTransfer(AbstractTransfer):
     codes: Int8[Array, "blocks k b"]  # points in their order
     scales: Float[Array, " k"]  # a coefficient is its code times its scale
     filled: int = eqx.field(static=True)  # places without a point at the end of the last block
+    surface: SurfaceKind = eqx.field(static=True, default="vertices", kw_only=True)
+    cosine: bool = eqx.field(static=True, default=True, kw_only=True)
 
     @property
     def num_points(self) -> int:
@@ -129,7 +136,7 @@ class QuantizedTransfer(AbstractTransfer):
         mesh = mesh_of(devices)
         flat = jnp.moveaxis(self.codes, 0, 1).reshape(1, len(self.scales), -1)
         codes = share(flat[..., : self.num_points], mesh, axis=2)
-        return QuantizedTransfer(codes, whole(self.scales, mesh), 0)
+        return dataclasses.replace(self, codes=codes, scales=whole(self.scales, mesh), filled=0)
 
     def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
         width = lights.shape[1]
@@ -170,7 +177,8 @@ def _sample(transfer, degree):
     values = matmul(basis.reshape(-1, basis.shape[2]), coefficients.T)
     samples = values.reshape(*basis.shape[:2], -1)
     positions, normals = rows_of(transfer.positions, transfer.normals)
-    return SampledTransfer(samples, coefficients, positions, normals)
+    kind = {"surface": transfer.surface, "cosine": transfer.cosine}
+    return SampledTransfer(samples, coefficients, positions, normals, **kind)
 
 
 def quantize(transfer: Transfer) -> QuantizedTransfer:
@@ -198,4 +206,5 @@ def quantize(transfer: Transfer) -> QuantizedTransfer:
     size = count if on_mesh(rows) else _BLOCK
     filled = -count % size if count else 0
     blocks = jnp.pad(codes, ((0, filled), (0, 0))).reshape(-1, size, width)
-    return QuantizedTransfer(jnp.swapaxes(blocks, 1, 2), scales, filled)
+    kind = {"surface": transfer.surface, "cosine": transfer.cosine}
+    return QuantizedTransfer(jnp.swapaxes(blocks, 1, 2), scales, filled, **kind)

@@ -9,8 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_flag, check_type
+from .._core.checks import align, as_float, check_cosine, check_flag, check_type
 from ..harmonics import degree_of
+from ._fluence import received
 from ._glossy_kernels import lobe_polynomial, lobe_products, reflected
 from ._material import Material, checked_albedo, checked_eye, checked_light, checked_material
 from ._stored import StoredTransfer
@@ -64,6 +65,7 @@ def shade_diffuse(
     ((1, 3), 0.25)
     """
     check_type("transfer", transfer, AbstractTransfer, StoredTransfer)
+    check_cosine(transfer)
     count, dtype = transfer.num_points, transfer.dtype
     light = checked_light(light, count, transfer.degree, dtype)
     albedo = checked_albedo(albedo, count, dtype)
@@ -74,14 +76,7 @@ def shade_diffuse(
 
 @jax.jit
 def _shade_diffuse(light, transfer, albedo):
-    if light.ndim == 2 or light.shape[-3] == 1:
-        batch = light.shape[:-3]
-        products = transfer.irradiances(light.reshape(math.prod(batch) * 3, light.shape[-1]))
-        irradiance = jnp.moveaxis(products.reshape(len(products), *batch, 3), 0, -2)
-    else:
-        coefficients = transfer.vectors(light.shape[-1])
-        irradiance = jnp.sum(jnp.multiply(*align(light, coefficients[:, None])), axis=-1)
-    return jnp.multiply(*align(irradiance, albedo / math.pi))
+    return jnp.multiply(*align(received(light, transfer), albedo / math.pi))
 
 
 @overload
@@ -161,6 +156,7 @@ def shade_glossy(
     (1, 3)
     """
     check_type("transfer", transfer, AbstractTransfer, StoredTransfer)
+    check_cosine(transfer)
     count, dtype = transfer.num_points, transfer.dtype
     eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
     light = checked_light(light, count, transfer.degree, dtype)

@@ -7,7 +7,9 @@ import numpy as np
 
 from .._core.words import reason
 
-FORMAT, VERSION = "jaxsh transfer store", 1
+FORMAT = "jaxsh transfer store"
+# Version 1 is of vertices with the cosine, and what those are written as; 2 of any points.
+VERSIONS = 1, 2
 
 
 def make_array(group: Any, name: str, shape: tuple[int, ...], dtype: np.dtype, rows: int) -> None:
@@ -43,9 +45,11 @@ def open_group(path: Path, mode: Any) -> tuple[Any, dict[str, Any]]:
     if attributes.get("format") != FORMAT:
         raise ValueError(f"{path}: not a transfer store; it is left as it is")
     version = attributes.get("version")
-    if version != VERSION:
+    if type(version) is not int or version not in VERSIONS:
         said = reason(str(version), 40)
-        raise ValueError(f"{path}: written as version {said}, but this jaxsh reads {VERSION}")
+        raise ValueError(
+            f"{path}: written as version {said}, but this jaxsh reads 1 and {VERSIONS[-1]}"
+        )
     return group, attributes
 
 

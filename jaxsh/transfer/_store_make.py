@@ -13,7 +13,7 @@ import numpy as np
 from .._core.words import reason
 from ._store import BlockStore
 from ._store_files import like
-from ._store_layout import FORMAT, VERSION, make_array
+from ._store_layout import FORMAT, VERSIONS, make_array
 
 # Rows of a block: about a hundredth of the mesh, so that little is lost when a bake is stopped, and
 # a power of two, so that it is whole tiles of the bake. With more a task of a cluster would take
@@ -52,7 +52,8 @@ def make(
             make_array(group, name, array.shape, array.dtype, rows)
         for name, (shape, dtype) in later.items():
             make_array(group, name, shape, dtype, rows)
-        group.attrs.update({"format": FORMAT, "version": VERSION} | attributes)
+        version = VERSIONS["surface" in attributes]
+        group.attrs.update({"format": FORMAT, "version": version} | attributes)
         store = BlockStore(temporary)
         store.put(**arrays)
         try:

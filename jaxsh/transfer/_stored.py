@@ -5,19 +5,21 @@ import functools
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, get_args
 
 import jax
 import numpy as np
 from jaxtyping import Array
 
-from .._core.checks import as_path
+from .._core.checks import as_path, check_choice, check_flag
 from .._core.devices import Devices, last_of, mesh_of, own_numbers, place
 from ..harmonics import degree_of
 from ._store import BlockStore
 from ._store_stream import stream
-from ._transfer import Transfer
+from ._transfer import SurfaceKind, Transfer
 
 _ARRAYS = "coefficients", "positions", "normals", "neighbors"
+_USUAL = {"surface": "vertices", "cosine": True}  # of a store that does not say
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,12 +48,19 @@ class StoredTransfer:
     num_points: int
     degree: int
     block_rows: int  # vertices in a block; the last may have fewer
+    surface: SurfaceKind
+    cosine: bool
     _store: BlockStore = dataclasses.field(repr=False, compare=False)
 
     @property
     def dtype(self) -> np.dtype:
         """The dtype of the colors that it shades: float32 where JAX's x64 is off."""
         return np.dtype(jax.dtypes.canonicalize_dtype(self._store.dtype))
+
+    @property
+    def kind(self) -> dict[str, Any]:
+        """Give what tells a transfer of these points from others."""
+        return {"surface": self.surface, "cosine": self.cosine}
 
     def blocks(self) -> Iterator[tuple[slice, Transfer]]:
         """Give each block with the vertices that it holds, the next being read meanwhile.
@@ -75,7 +84,7 @@ class StoredTransfer:
         def give(
             rows: slice, coefficients: Array, positions: Array, normals: Array, neighbors: Array
         ) -> tuple[slice, Transfer]:
-            return rows, Transfer(coefficients, positions, normals, neighbors)
+            return rows, Transfer(coefficients, positions, normals, neighbors, **self.kind)
 
         yield from stream(self._store, _ARRAYS, give, keep=True)
 
@@ -83,7 +92,7 @@ class StoredTransfer:
         """Read the whole transfer into memory; raises `ValueError` for a damaged block."""
         arrays = (jax.device_put(self._store.whole(name)) for name in _ARRAYS)
         coefficients, positions, normals, neighbors = arrays
-        return Transfer(coefficients, positions, normals, neighbors)
+        return Transfer(coefficients, positions, normals, neighbors, **self.kind)
 
     def sharded(self, devices: Devices = None) -> Transfer:
         """Read the transfer shared out over devices, filled up as `Transfer.sharded` does.
@@ -107,7 +116,7 @@ class StoredTransfer:
             )
             for name in _ARRAYS
         )
-        return Transfer(coefficients, positions, normals, neighbors)
+        return Transfer(coefficients, positions, normals, neighbors, **self.kind)
 
 
 def open(path: str | os.PathLike[str]) -> StoredTransfer:
@@ -146,10 +155,18 @@ def open(path: str | os.PathLike[str]) -> StoredTransfer:
                 f"{path}: not finished: {len(missing)} of {store.num_blocks} blocks of {name} are "
                 "missing or cut off; bake into it again with the same arguments"
             )
+    surface, cosine = (store.attributes.get(name, usual) for name, usual in _USUAL.items())
+    try:
+        check_choice("surface", surface, get_args(SurfaceKind))
+        check_flag("cosine", cosine)
+    except ValueError as error:
+        raise ValueError(f"{path}: damaged: {error}") from None
     return StoredTransfer(
         path=path,
         num_points=store.num_points,
         degree=degree_of(store.width),
         block_rows=store.block_rows,
+        surface=surface,
+        cosine=cosine,
         _store=store,
     )

@@ -29,6 +29,18 @@ def streamed_diffuse(
     return _shaded(transfer, ("coefficients",), of)
 
 
+def streamed_fluence(
+    product: Callable[..., Array], light: Float[Array, "..."], transfer: StoredTransfer
+) -> Float[np.ndarray, "... v 3"]:
+    """Multiply each block by `product(light, transfer)`; the arguments are checked."""
+    lights = _on_host("light", light)
+
+    def of(rows: slice, block: Transfer) -> Array:
+        return product(_own(lights, rows), block)
+
+    return _shaded(transfer, ("coefficients",), of)
+
+
 def streamed_glossy(
     shade: Callable[..., Array],
     light: Float[Array, "..."],
@@ -70,7 +82,8 @@ def _shaded(
         held = dict(zip(arrays, read, strict=True))
         left, neighbors = zeros(len(read[0]))
         positions, normals = held.get("positions", left), held.get("normals", left)
-        return rows, shade(rows, Transfer(held["coefficients"], positions, normals, neighbors))
+        block = Transfer(held["coefficients"], positions, normals, neighbors, **transfer.kind)
+        return rows, shade(rows, block)
 
     for rows, part in stream(transfer._store, arrays, give, keep=False):
         if colors is None:

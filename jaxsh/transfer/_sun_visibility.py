@@ -13,6 +13,7 @@ from jaxtyping import Array, Bool, Float, UInt32
 from .._core.checks import (
     as_float,
     as_host_float,
+    check_cosine,
     check_finite,
     check_known,
     check_size,
@@ -256,6 +257,7 @@ def points_of(surface: Surface) -> tuple[Float[Array, "v 3"], Float[Array, "v 3"
     check_type("surface", surface, Mesh, Transfer, SampledTransfer)
     if isinstance(surface, Mesh):
         return as_float(surface.vertices, "vertices"), as_float(surface.normals, "normals")
+    check_cosine(surface)
     if isinstance(surface, SampledTransfer):
         return surface.positions.T, surface.normals.T
     return surface.positions, surface.normals

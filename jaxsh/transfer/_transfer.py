@@ -1,22 +1,33 @@
 """Transfer: what all its forms offer, and the one that holds coefficients."""
 
 import abc
+import dataclasses
+from typing import Literal, get_args
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, DTypeLike, Float, Int
 
 from .._core.checks import (
     as_float,
     as_integer,
+    check_choice,
     check_coefficients,
     check_degree,
+    check_flag,
     check_known,
+    check_type,
+    is_concrete,
 )
 from .._core.devices import Devices, last_of, mesh_of, own_numbers, share
 from .._core.linalg import shading_matmul, shading_tall_product
 from ..harmonics import degree_of, num_coefficients
 from ._glossy_kernels import AtNodes, node_passes, reflected
+from ._surfaces import Surface, points_and_normals
+
+# What the rows of a transfer are: vertices of a mesh, points, or texels of an atlas.
+SurfaceKind = Literal["vertices", "points", "texels"]
 
 
 class AbstractTransfer(eqx.Module):
@@ -37,6 +48,9 @@ class AbstractTransfer(eqx.Module):
     >>> made.irradiances(jnp.ones((2, 4))).shape
     (1, 2)
     """
+
+    surface: eqx.AbstractVar[SurfaceKind]
+    cosine: eqx.AbstractVar[bool]  # False for points without normals, which `fluence` takes
 
     @property
     @abc.abstractmethod
@@ -80,6 +94,10 @@ class Transfer(AbstractTransfer):
     baked, are in them. `neighbors` is the padded table of `geometry.neighbors`: a row names the
     point itself where it has fewer neighbors than others.
 
+    `surface` says what the V points are: the "vertices" of a mesh, "points", or "texels". Without
+    `cosine` they are points of a volume: the coefficients are ∫ V(ω) y_i(ω) dω, all normals are
+    zero, and `fluence` takes the place of shading.
+
     Shading differentiates in the coefficients, and glossy shading in positions and normals too,
     through the mirrored direction alone. The coefficients of a bake are constants: neither they
     nor `shade_diffuse` change with the positions and normals stored beside them, so that its
@@ -100,8 +118,12 @@ class Transfer(AbstractTransfer):
     positions: Float[Array, "v 3"] = eqx.field(converter=lambda v: as_float(v, "positions"))
     normals: Float[Array, "v 3"] = eqx.field(converter=lambda v: as_float(v, "normals"))
     neighbors: Int[Array, "v n"] = eqx.field(converter=lambda v: as_integer(v, "neighbors"))
+    surface: SurfaceKind = eqx.field(static=True, default="vertices", kw_only=True)
+    cosine: bool = eqx.field(static=True, default=True, kw_only=True)
 
     def __check_init__(self):
+        check_choice("surface", self.surface, get_args(SurfaceKind))
+        check_flag("cosine", self.cosine)
         if self.coefficients.ndim != 2:
             raise ValueError(f"expected coefficients (V, K), got shape {self.coefficients.shape}")
         check_coefficients("coefficients", self.coefficients)
@@ -130,14 +152,16 @@ class Transfer(AbstractTransfer):
     def truncated(self, degree: int) -> "Transfer":
         """Cut the coefficients to a degree; raises `ValueError` for one above the transfer's."""
         cut = self.coefficients[:, : num_coefficients(checked_degree(self, degree))]
-        return Transfer(cut, self.positions, self.normals, self.neighbors)
+        return dataclasses.replace(self, coefficients=cut)
 
     def astype(self, dtype: DTypeLike) -> "Transfer":
         """Cast all but the neighbors."""
         coefficients, positions, normals = (
             array.astype(dtype) for array in (self.coefficients, self.positions, self.normals)
         )
-        return Transfer(coefficients, positions, normals, self.neighbors)
+        return dataclasses.replace(
+            self, coefficients=coefficients, positions=positions, normals=normals
+        )
 
     def sharded(self, devices: Devices = None) -> "Transfer":
         """Share the points out over devices (default: all), filled up as `shard_rows` does.
@@ -149,11 +173,35 @@ class Transfer(AbstractTransfer):
         """
         check_known("transfer", self)
         mesh = mesh_of(devices)
-        return Transfer(
-            share(self.coefficients, mesh),
-            share(self.positions, mesh, filling=last_of(self.positions)),
-            share(self.normals, mesh),
-            share(self.neighbors, mesh, filling=own_numbers(self.neighbors.shape[1])),
+        return dataclasses.replace(
+            self,
+            coefficients=share(self.coefficients, mesh),
+            positions=share(self.positions, mesh, filling=last_of(self.positions)),
+            normals=share(self.normals, mesh),
+            neighbors=share(self.neighbors, mesh, filling=own_numbers(self.neighbors.shape[1])),
+        )
+
+    def belongs_to(self, surface: Surface) -> bool:
+        """Tell whether these are the points of a surface: as many, in the same places and order.
+
+        Compares positions and normals, rounded to the transfer's dtype; of those that are traced or
+        held by other processes the number alone. What `sharded` has filled up is passed over.
+        Raises `TypeError` for what is no surface.
+        """
+        check_type("surface", surface, *(get_args(Surface) or (Surface,)))
+        points, normals = points_and_normals(surface)
+        count = len(points)
+        if (normals is not None) != self.cosine or not 0 < count <= self.num_points:
+            return False
+        if not all(map(is_concrete, (points, normals, self.positions, self.normals))):
+            return self.num_points == count
+        places, ways = np.asarray(self.positions), np.asarray(self.normals)
+        if np.any(places[count:] != places[count - 1][None]):
+            return False
+        towards = np.zeros_like(points) if normals is None else np.asarray(normals)
+        return all(
+            np.array_equal(own[:count], given.astype(own.dtype), equal_nan=True)
+            for own, given in ((places, np.asarray(points)), (ways, towards))
         )
 
     def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:

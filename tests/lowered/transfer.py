@@ -1,5 +1,7 @@
 """`jaxsh.transfer` at full size."""
 
+import dataclasses
+
 import jax.numpy as jnp
 
 from jaxsh import sphere, transfer
@@ -20,6 +22,7 @@ from .sphere import suns
 
 WITHOUT = {
     "Material": "holds what it is given",
+    "Transfer.belongs_to": "compares arrays on the host, and where they are traced their shapes",
     "Transfer": "holds what it is given",
     "bake": "runs on the host: tests/transfer/test_bake_device.py lowers what it runs on a device",
     "bake_on": "runs on a cluster",
@@ -30,6 +33,7 @@ WITHOUT = {
 def calls():
     t = transfer
     made, light, own, eye = baked(), floats(3, K), floats(V, 3, K), floats(3)
+    volume = made_by(lambda made: dataclasses.replace(made, surface="points", cosine=False), made)
     sampled, albedo = made_by(t.sample, made), floats(V, 3)
     still = made_by(t.fixed_light, light, made)
     view = made_by(t.fixed_view, made, eye, material())
@@ -53,6 +57,8 @@ def calls():
         "Transfer.truncated": of(lambda made: made.truncated(5), made),
         "fixed_light": of(t.fixed_light, light, made),
         "fixed_view": of(t.fixed_view, made, eye, material()),
+        "fluence": of(t.fluence, light, volume),
+        "fluence, own lights": of(t.fluence, own, volume),
         "quantize": of(t.quantize, made),
         "reflected_direction": of(t.reflected_direction, eye, floats(V, 3), floats(V, 3)),
         "sample": of(t.sample, made),

@@ -1,5 +1,7 @@
 """Shading on a mesh of devices, sharded over the vertices."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 from sharding import ROWS, WHOLE, P, check_sharded
 
 from jaxsh._core import xla
+from jaxsh.geometry import Mesh
 from jaxsh.sphere import Suns
 from jaxsh.transfer import (
     Material,
@@ -15,6 +18,7 @@ from jaxsh.transfer import (
     Transfer,
     fixed_light,
     fixed_view,
+    fluence,
     quantize,
     reflected_direction,
     sample,
@@ -53,6 +57,16 @@ def frame(rng):
     )
     material = Material(array(V, 3), array(V, 1), 10 * array(V))
     return array(3, K), made, jnp.asarray(EYE), material
+
+
+def test_fluence_and_what_a_transfer_belongs_to(frame, rng):
+    light, made, *_ = frame
+    own = jnp.asarray(rng.normal(size=(V, 3, K)), np.float32)
+    volume = dataclasses.replace(made, surface="points", cosine=False)
+    check_sharded(fluence, (light, volume), (WHOLE, ROWS), ROWS)
+    check_sharded(fluence, (own, volume), (ROWS, ROWS), ROWS)
+    mesh = Mesh(made.positions, jnp.zeros((1, 3), int), made.normals)
+    assert made.sharded(jax.devices()).belongs_to(mesh)
 
 
 def test_diffuse_shading(frame, rng):

@@ -128,7 +128,7 @@ def changed(path, file, change):
     [
         ("zarr.json", lambda b: b[:50], "not a transfer store"),
         ("zarr.json", lambda b: b.replace(b"jaxsh transfer store", b"a thesis"), "not a transfer"),
-        ("zarr.json", lambda b: b.replace(b'"version": 1', b'"version": 2'), "as version 2, but"),
+        ("zarr.json", lambda b: b.replace(b'"version": 1', b'"version": 3'), "as version 3, but"),
         ("coefficients/zarr.json", lambda b: b[:50], "damaged: it holds no coefficients"),
         (
             "coefficients/zarr.json",

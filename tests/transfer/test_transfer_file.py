@@ -1,5 +1,7 @@
 """Transfer files: what is written is read, and what is not a transfer is refused."""
 
+import dataclasses
+
 import equinox as eqx
 import hypothesis.strategies as st
 import jax
@@ -35,6 +37,14 @@ def test_a_file_gives_back_every_bit(tmp_path, dtype, name):
     assert eqx.tree_equal(load(str(path)), given)
     assert [file.name for file in path.parent.iterdir()] == [path.name]
     np.testing.assert_array_equal(np.load(path)["coefficients"], given.coefficients)
+
+
+def test_a_file_says_what_its_points_are(tmp_path):
+    volume = dataclasses.replace(transfer(), surface="points", cosine=False)
+    path = save(tmp_path / "a", volume)
+    assert eqx.tree_equal(load(path), volume)
+    assert np.load(path)["version"] == 2
+    assert np.load(save(path, transfer()))["version"] == 1  # which older versions read
 
 
 def test_a_file_is_replaced_only_by_a_whole_one(tmp_path, monkeypatch):
@@ -101,7 +111,10 @@ def rewritten(path, **changes):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"version": np.array(2)}, "written as version 2, but this jaxsh reads 1"),
+        ({"version": np.array(3)}, "written as version 3, but this jaxsh reads 1 and 2"),
+        ({"version": np.array(2), "surface": None}, "damaged: surface must be one of vertices"),
+        ({"version": np.array(2), "surface": np.array("sea")}, "damaged: surface must be one of"),
+        ({"version": np.array(2), "cosine": np.array(1)}, "damaged: cosine has dtype int64"),
         ({"version": np.array("new")}, "written as version new"),
         ({"format": np.array("pictures")}, "not a transfer file"),
         ({"format": None}, "not a transfer file"),

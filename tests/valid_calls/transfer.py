@@ -1,5 +1,7 @@
 """Valid calls of `jaxsh.transfer`."""
 
+import dataclasses
+
 import numpy as np
 
 from jaxsh import sphere, transfer
@@ -9,6 +11,7 @@ from .shared import K, V, eye, floats, knot, made, material, of
 
 def calls():
     t = transfer
+    volume = dataclasses.replace(made(), surface="points", cosine=False)
     light, flags = floats(3, K), {"distant": True, "normalized": True}
     suns = sphere.Suns(floats(2, 3), floats(2), floats(2, 3))
     rays = {
@@ -39,6 +42,8 @@ def calls():
             positions=floats(V, 3),
             normals=floats(V, 3),
             neighbors=np.zeros((V, 2), np.int32),
+            surface="points",
+            cosine=False,
         ),
         "Material.sharded": of(material().sharded, devices=None, host=True),
         "SampledTransfer.sharded": of(t.sample(made()).sharded, devices=None, host=True),
@@ -77,6 +82,8 @@ def calls():
             **flags,
             finite="eye",
         ),
+        "Transfer.belongs_to": of(made().belongs_to, surface=knot()),
+        "fluence": of(t.fluence, light=light, transfer=volume, finite="light"),
         "load": of(t.load, path="no such file", host=True),
         "open": of(t.open, path="no such folder", host=True),
         "quantize": of(t.quantize, transfer=made()),
