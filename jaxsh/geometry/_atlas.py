@@ -94,16 +94,44 @@ def barycentric(
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-def nearest(own: Int[np.ndarray, "h w"], gutter: int) -> Int[np.ndarray, "h w"]:
-    """Fill -1 with the entry of the nearest texel that has one, up to `gutter` texels away."""
+def nearest(
+    own: Int[np.ndarray, "h w"], corners: Float[np.ndarray, "f 3 2"], gutter: int
+) -> Int[np.ndarray, "h w"]:
+    """Fill -1 with the entry of the nearest texel that has one, up to `gutter` texels from a face.
+
+    Not from a center in a face: so one texel serves bilinear look-ups, at a thin chart too.
+    """
     if gutter == 0 or (own >= 0).all():
         return own
     from scipy import ndimage  # JAX itself needs SciPy
 
-    empty = own < 0
-    found: Any = ndimage.distance_transform_edt(empty, return_indices=True)
-    away, (row, column) = found
-    return np.where(empty & (away <= gutter), own[row, column], own)
+    away = ndimage.distance_transform_cdt(~_touched(own >= 0, corners), metric="chessboard")
+    found: Any = ndimage.distance_transform_edt(
+        own < 0, return_distances=False, return_indices=True
+    )
+    row, column = found
+    return np.where(away <= gutter, own[row, column], own)
+
+
+def _touched(covered: np.ndarray, corners: Float[np.ndarray, "f 3 2"]) -> np.ndarray:
+    """Add to the texels that have their centers in a face those that an edge passes through."""
+    touched = covered.copy()
+    # A trifle inwards: an edge between two rows of texels touches those of its face.
+    corners = corners + _ON_EDGE * (corners.mean(axis=1, keepdims=True) - corners)
+    start = corners.reshape(-1, 2)
+    along = np.roll(corners, -1, axis=1).reshape(-1, 2) - start
+    length = np.abs(along).max(axis=1)
+    known = np.isfinite(length)
+    start, along, length = start[known], along[known], length[known]
+    steps = np.ceil(2 * length).astype(np.int64) + 1  # at most half a texel each
+    size = np.array(covered.shape)[::-1] - 1
+    for part in _blocks(steps):
+        edge = np.repeat(part, steps[part])
+        share = ranges(0 * part, steps[part]) / np.maximum(steps[edge] - 1, 1)
+        at = np.floor(start[edge] + share[:, None] * along[edge]).astype(np.int64)
+        column, row = np.clip(at, 0, size).T
+        touched[row, column] = True
+    return touched
 
 
 def _spans(corners: Float[np.ndarray, "f 3 2"], width: int, height: int) -> tuple[np.ndarray, ...]:

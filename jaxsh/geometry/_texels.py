@@ -162,8 +162,9 @@ def texels(
     **Arguments**
 
     - `resolution`: of the picture: its side, or width and height.
-    - `gutter`: the texels around each chart that show the nearest texel of it, so that look-ups at
-      its rim mix in no background: 1 for bilinear ones, twice as many for each level of mip maps.
+    - `gutter`: the texels around what faces touch that show the nearest one with its center in a
+      face, so that look-ups at a chart's rim mix in no background: 1 for bilinear ones, twice as
+      many for each level of mip maps.
     - `unwrap`: True unwraps also a mesh that has UV: for those that overlap or repeat, as for
       textures. These textures stay with the mesh given, and are left out of `Texels.mesh`.
 
@@ -234,7 +235,7 @@ def _texels(
         uv=jnp.asarray(uv, like),
         face=jnp.asarray(face, jnp.int32),
         barycentric=jnp.asarray(weights, like),
-        source=jnp.asarray(nearest(source, gutter), jnp.int32),
+        source=jnp.asarray(nearest(source, corners, gutter), jnp.int32),
         mesh=mesh,
         vertex=jnp.asarray(vertex),
     )
@@ -282,6 +283,7 @@ def _check(covered: Covered, own: bool) -> None:
             f"{column}: unwrap=True makes new ones"
         )
     found = [
+        (twice, "texels are in several faces, and show the first"),
         (covered.flat, "faces have no area in UV and are on no texel"),
         (covered.hidden, "charts are smaller than a texel and show what is beside them"),
     ]

@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 from ._mesh import Mesh
 
 # Share of the square that charts should cover; below they are packed closer, if they can be.
-_COVERED = 0.25
+_COVERED = 0.15
 # Packings that are tried for one distance between charts.
 _TRIES = 8
 
@@ -85,7 +85,7 @@ def _pack(charts: _Charts, size: int, gutter: int) -> tuple[Float[np.ndarray, "u
         for uv, covered in _packings(charts, size, apart):
             if covered > most:
                 best, most = (uv, apart), covered
-        if apart == 0 or (most >= _COVERED and best is not None):
+        if apart == 0 or most >= _COVERED:
             break
         apart //= 2
     if best is None:
