@@ -1,4 +1,4 @@
-"""The base color of a mesh where it is wanted: at its vertices, at what a camera sees."""
+"""The base color of a mesh where it is wanted: at vertices, at texels, at what a camera sees."""
 
 from typing import NamedTuple
 
@@ -10,13 +10,13 @@ from jaxtyping import Array, Float, Int
 from .._core.checks import at_hand, check_type
 from .._core.linalg import einsum
 from .._core.xla import keep_rows
-from ..geometry import BaseColor, Mesh
+from ..geometry import BaseColor, Mesh, Texels
 from ._display import srgb_decode
 from ._raster import Raster
 from ._texture import Pyramid, longer_step, pyramid, sample
 
 
-def base_color(mesh: Mesh, at: Raster | None = None) -> Float[Array, "*shape 3"]:
+def base_color(mesh: Mesh, at: Raster | Texels | None = None) -> Float[Array, "*shape 3"]:
     """Compute the base color of a mesh: factor times texture times color of the vertices.
 
     The albedo of its surface, linear RGB, in the dtype of the vertices; alpha is left out, since
@@ -27,14 +27,16 @@ def base_color(mesh: Mesh, at: Raster | None = None) -> Float[Array, "*shape 3"]
     - `at`: where. None: at the vertices (v, 3), the mean over the faces around, each with the mean
       of its texture over an area as large as the face's cell. A `Raster` of this mesh: at each of
       its samples (height·n, width·n, 3), 0 for background, as `interpolate` takes it for `color`.
+      `Texels` of it: at them (n, 3), as `transfer` takes it for an albedo. Give the mesh that the
+      texels were made of, also where it was unwrapped: `texels.mesh` has then lost its textures.
 
     Raises `ValueError` where a texture has no UV to go by, materials do not say which faces they
-    are of or a raster is of another mesh, and `TypeError` for anything else in `at`.
+    are of, or a raster or texels are of another mesh, and `TypeError` for anything else in `at`.
 
     Differentiable in factors, colors of the vertices and UV; not in textures, which are 8-bit
     codes: to fit one, decode it and use `sample_texture`. Runs under `jit`. Shards over the
-    raster's rows, where the mesh is whole on each device. All textures are decoded together, to
-    16 bytes a texel.
+    raster's rows and over texels, where the mesh is whole on each device. All textures are decoded
+    together, to 16 bytes a texel.
 
     **Example**
 
@@ -47,12 +49,16 @@ def base_color(mesh: Mesh, at: Raster | None = None) -> Float[Array, "*shape 3"]
     """
     check_type("mesh", mesh, Mesh)
     if at is not None:
-        check_type("at", at, Raster)
+        check_type("at", at, Raster, Texels)
     _check_materials(mesh)
     if at is None:
         return _at_vertices(mesh)
-    _check_faces(mesh, at.faces, "raster")
-    return _at_samples(mesh, at)
+    if isinstance(at, Raster):
+        _check_faces(mesh, "a raster", at.faces)
+    elif at.mesh is not mesh:
+        # Unwrapped, a mesh has more vertices, which know those that they were.
+        _check_faces(mesh, "texels", at.mesh.faces, at.vertex[at.mesh.faces])
+    return _at_places(mesh, at)
 
 
 def _check_materials(mesh: Mesh) -> None:
@@ -77,15 +83,19 @@ def _check_materials(mesh: Mesh) -> None:
             )
 
 
-def _check_faces(mesh: Mesh, faces: Int[Array, "f 3"], what: str) -> None:
+def _check_faces(mesh: Mesh, what: str, *known: Int[Array, "f 3"]) -> None:
+    """Raises `ValueError` unless the faces are one of those that are known."""
     ours = jnp.asarray(mesh.faces)
-    same = ours.shape == faces.shape
-    if same and ours is not faces and at_hand(ours) and at_hand(faces):
-        same = np.array_equal(ours, faces)
-    if not same:
+
+    def same(faces: Array) -> bool:
+        if ours.shape != faces.shape or ours is faces or not (at_hand(ours) and at_hand(faces)):
+            return ours.shape == faces.shape
+        return np.array_equal(ours, faces)
+
+    if not any(same(faces) for faces in known):
         raise ValueError(
-            f"expected a {what} of this mesh, with its {len(ours)} faces, got one of another mesh "
-            f"with {len(faces)}"
+            f"expected {what} of this mesh, with its {len(ours):,} faces, got those of another "
+            f"with {len(known[0]):,}"
         )
 
 
@@ -120,14 +130,37 @@ def _material(mesh: Mesh, face: Int[Array, "*shape"]) -> Int[Array, "*shape"]:
 
 
 @jax.jit
-def _at_samples(mesh: Mesh, raster: Raster):
-    def samples(mesh: Mesh, raster: Raster):
-        seen = raster.face >= 0
-        face = jnp.maximum(raster.face, 0)
-        found = _colors(mesh, face, raster.barycentric, raster.footprint)
-        return jnp.where(seen[..., None], found, 0)
+def _at_places(mesh: Mesh, at: Raster | Texels):
+    def raster(mesh: Mesh, at: Raster):
+        face = jnp.maximum(at.face, 0)
+        found = _colors(mesh, face, at.barycentric, at.footprint)
+        return jnp.where((at.face >= 0)[..., None], found, 0)
 
-    return keep_rows(samples, mesh, raster, like=raster.face, axis=0, out=0)
+    def texels(mesh: Mesh, at: Texels):
+        footprint = None if mesh.uv is None else _texel_footprint(mesh.uv, mesh.faces, at)
+        return _colors(mesh, at.face, at.barycentric, footprint)
+
+    colors = raster if isinstance(at, Raster) else texels
+    return keep_rows(colors, mesh, at, like=at.face, axis=0, out=0)
+
+
+def _texel_footprint(uv, faces, texels: Texels):
+    """The change of UV over a texel to the right and one down, where texels may have UV apart."""
+    own = texels.mesh.uv
+    assert own is not None
+
+    def edges(uv, faces):
+        corners = uv[faces[texels.face]]
+        return jnp.moveaxis(corners[:, 1:] - corners[:, :1], 0, -1)
+
+    (a, b), (c, d) = edges(own.astype(uv.dtype), texels.mesh.faces)
+    area = a * d - b * c
+    area = jnp.where(area == 0, jnp.inf, area)  # has no cells: looked up as it is
+    height, width = texels.shape
+    first, second = edges(uv, faces)
+    right = (first * d[None] - second * b[None]) / (area * width)[None]
+    down = (first * c[None] - second * a[None]) / (area * height)[None]
+    return jnp.stack([right.T, down.T], axis=-1)
 
 
 def _colors(mesh: Mesh, face, barycentric, footprint):
@@ -162,7 +195,7 @@ def _at_vertices(mesh: Mesh):
         picture = surface.picture[material]
         height, width = (n.astype(uv.dtype) for n in _sizes(surface.textures, picture))
         # A vertex stands for a third of each face around it, about two faces in all.
-        (a, b), (c, d) = jnp.moveaxis(uv[:, 1:] - uv[:, :1], 0, -1)
+        (a, b), (c, d) = jnp.moveaxis(uv[:, 1:] - uv[:, :1], 0, -1)  # edges
         squared = jnp.abs(a * d - b * c) * height * width
         picture, squared = (jnp.broadcast_to(x[:, None], faces.shape) for x in (picture, squared))
         color = color * sample(surface.textures, picture, uv, squared, "repeat")

@@ -102,7 +102,7 @@ def rasterize(
 
 def interpolate(
     raster: Raster,
-    values: Float[Array, "v c"],
+    values: Float[Array, "v c"] | Float[Array, "hn wn c"],
     background: float | Float[Array, " c"] | Float[Array, "h w c"] = 0.0,
     *,
     color: Float[Array, "hn wn c"] | None = None,
@@ -113,8 +113,10 @@ def interpolate(
     a color or a picture (as from `backdrop`). Give linear radiance: the mean of encoded colors is
     not the color of the mean light. `color`, one for each of the raster's samples, as `base_color`
     and `sample_texture` give it, is multiplied into the values there, before the mean: a texture
-    may be finer than the mesh. Has the dtype of `values`. Raises `ValueError` for values of
-    another shape or of too few vertices, and for a background or color of another shape.
+    may be finer than the mesh. Values may be of the samples themselves too (height·n, width·n, c),
+    as a lightmap's by `sample_texture(lightmap, raster.uv, raster.footprint)`. Has the dtype of
+    `values`. Raises `ValueError` for values of another shape or of too few vertices, and for a
+    background or color of another shape.
 
     Differentiable, forward and reverse, in `values`, `background`, `color` and the raster's
     weights. Runs under `jit` and `vmap`. Shards over the raster's rows, where `values` are whole on
@@ -132,24 +134,29 @@ def interpolate(
     """
     check_type("raster", raster, Raster)
     values, background = as_float(values, "values"), as_float(background, "background")
-    if values.ndim != 2:
-        raise ValueError(f"expected values (v, c), one row per vertex, got shape {values.shape}")
-    if is_concrete(raster.faces) and len(raster.faces):
+    of_samples = values.ndim == 3 and values.shape[:2] == raster.face.shape
+    if values.ndim != 2 and not of_samples:
+        raise ValueError(
+            f"expected values (v, c), one row per vertex, or {(*raster.face.shape, 'c')}, one for "
+            f"each sample of the raster, got shape {values.shape}"
+        )
+    if not of_samples and is_concrete(raster.faces) and len(raster.faces):
         vertices = int(np.max(np.asarray(raster.faces))) + 1
         if vertices > len(values):
             raise ValueError(f"expected values for {vertices} vertices, got {len(values)}")
     behind = background.astype(values.dtype)
-    shape = (*raster.shape, values.shape[1])
+    shape = (*raster.shape, values.shape[-1])
     if behind.shape not in ((), shape[2:], shape):
         raise ValueError(
             f"expected background as a number, {shape[2:]} or {shape}, got shape {behind.shape}"
         )
     if color is not None:
         color = as_float(color, "color").astype(values.dtype)
-        if color.shape != (*raster.face.shape, values.shape[1]):
+        wanted = (*raster.face.shape, values.shape[-1])
+        if color.shape != wanted:
             raise ValueError(
-                f"expected color {(*raster.face.shape, values.shape[1])}, one for each sample of "
-                f"the raster, got shape {color.shape}"
+                f"expected color {wanted}, one for each sample of the raster, got shape "
+                f"{color.shape}"
             )
     return _interpolate(raster, values, behind, color)
 
@@ -163,10 +170,12 @@ def _alpha(face: Int[Array, "hn wn"], samples: int) -> Float[Array, "h w"]:
 @jax.jit
 def _interpolate(raster: Raster, values, background, color):
     def pixels(raster: Raster, values, background, color):
-        # The background's -1 would be the last face, but its weights are zero.
-        corners = values[raster.faces[jnp.maximum(raster.face, 0)]]
-        weights = raster.barycentric.astype(values.dtype)
-        seen = einsum("hwkc,hwk->hwc", corners, weights)
+        seen = values
+        if values.ndim == 2:
+            # The background's -1 would be the last face, but its weights are zero.
+            corners = values[raster.faces[jnp.maximum(raster.face, 0)]]
+            weights = raster.barycentric.astype(values.dtype)
+            seen = einsum("hwkc,hwk->hwc", corners, weights)
         seen = seen if color is None else seen * color
         seen = jnp.where((raster.face >= 0)[..., None], seen, 0)
         seen = _resolve(seen, raster.samples)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsh.geometry import BaseColor, Mesh, make_mesh, read_mesh, write_mesh
+from jaxsh.geometry import BaseColor, Mesh, make_mesh, read_mesh, texels, write_mesh
 from jaxsh.imaging import (
     Camera,
     Raster,
@@ -53,9 +53,8 @@ def on_plane(x, y):
 def test_a_raster_has_uv_and_their_derivative(raster):
     y, x = np.nonzero(np.asarray(raster.face) >= 0)
     assert 100 < len(x) < 320
-    place, slope = jax.vmap(lambda x, y: (on_plane(x, y), jax.jacfwd(on_plane, (0, 1))(x, y)))(
-        jnp.asarray(x, float), jnp.asarray(y, float)
-    )
+    both = jax.vmap(lambda x, y: (on_plane(x, y), jax.jacfwd(on_plane, (0, 1))(x, y)))
+    place, slope = jax.jit(both)(jnp.asarray(x, float), jnp.asarray(y, float))
     # Rays and barycentric coordinates are float32: 6e-7 and 3e-8 measured.
     np.testing.assert_allclose(raster.uv[y, x], place, rtol=0, atol=2e-6)
     np.testing.assert_allclose(raster.footprint[y, x], jnp.stack(slope, -1), rtol=0, atol=1e-7)
@@ -100,6 +99,7 @@ def test_base_color_is_factor_times_texture_times_vertex_color(raster):
     np.testing.assert_allclose(image, drawn, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_base_color_at_vertices_is_the_mean_over_their_faces():
     mesh = textured()
     found = base_color(mesh)
@@ -116,12 +116,42 @@ def test_base_color_at_vertices_is_the_mean_over_their_faces():
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
+def test_base_color_at_texels_is_filtered_over_them():
+    """An atlas of its own UV, then one whose UV the texture's are an affine function of."""
+    mesh = dataclasses.replace(sheet(), face_material=jnp.zeros(2, jnp.int32))
+    mesh = dataclasses.replace(mesh, materials=(BaseColor(texture=CODES),))
+    atlas = dataclasses.replace(mesh, uv=(mesh.vertices[:, [0, 2]] + 1) / 2)
+    held = texels(atlas, (3, 4), gutter=0)
+    picture = srgb_decode(jnp.asarray(CODES[..., :3] / 255))
+    step = np.broadcast_to(np.diag([1 / 3, -1 / 4]), (12, 2, 2))
+    found = base_color(atlas, held)
+    expected = sample_texture(picture, held.uv, jnp.asarray(step))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+    # uv = A (x, z) and (x, z) = 2 (u, v) - 1 of the atlas.
+    turn = np.array([[0.4, 0.3], [-0.2, 0.7]])
+    uv = (2 * np.asarray(held.uv) - 1) @ turn.T
+    expected = sample_texture(picture, jnp.asarray(uv), jnp.asarray(2 * turn @ step))
+    np.testing.assert_allclose(base_color(mesh, held), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_lightmap_is_drawn_as_its_texels_are(raster):
+    """Values of samples go through as those of vertices do, where both are the same."""
+    light = jnp.linspace(0.5, 2, 12).reshape(4, 3)
+    at = jnp.asarray(sheet().faces)[raster.face]
+    seen = jnp.einsum("hwk,hwkc->hwc", raster.barycentric.astype(float), light[at])
+    drawn = interpolate(raster, seen, 0.25)
+    np.testing.assert_allclose(drawn, interpolate(raster, light, 0.25), rtol=0, atol=1e-14)
+
+
 def test_a_mesh_without_colors_is_white(raster):
     np.testing.assert_array_equal(base_color(sheet()), 1)
     seen = np.asarray(raster.face)[..., None] >= 0
     np.testing.assert_array_equal(base_color(sheet(), raster), np.tile(seen, (1, 1, 3)))
 
 
+@pytest.mark.slow
 def test_base_color_differentiates_in_what_is_no_code(raster, rng):
     def loss(factor, colors, uv):
         mesh = textured()
@@ -146,6 +176,7 @@ def test_base_color_differentiates_in_what_is_no_code(raster, rng):
     np.testing.assert_allclose(total, slope, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_textured_glb_shows_its_picture(tmp_path):
     """Written, read back and drawn: each sample has the color that was painted at its UV."""
     u, v = np.meshgrid((np.arange(64) + 0.5) / 64, 1 - (np.arange(64) + 0.5) / 64)
@@ -186,10 +217,14 @@ def test_what_does_not_fit_is_refused(raster, unchecked):
             base_color(dataclasses.replace(mesh, **change))
     other = Raster(raster.face, raster.barycentric, raster.faces[:1], 2)
     with pytest.raises(
-        ValueError, match="raster of this mesh, with its 2 faces, got one of another"
+        ValueError, match="a raster of this mesh, with its 2 faces, got those of another"
     ):
         base_color(mesh, other)
-    with pytest.raises(TypeError, match="expected at as a Raster"):
+    held = texels(dataclasses.replace(mesh, uv=(mesh.vertices[:, [0, 2]] + 1) / 2), 4)
+    turned = dataclasses.replace(mesh, faces=mesh.faces[::-1])
+    with pytest.raises(ValueError, match="expected texels of this mesh, with its 2 faces"):
+        base_color(turned, held)
+    with pytest.raises(TypeError, match="expected at as a Raster or a Texels"):
         base_color(mesh, "raster")
     with pytest.raises(ValueError, match=r"expected color \(16, 20, 3\), one for each sample"):
         interpolate(raster, jnp.ones((4, 3)), color=jnp.ones((8, 10, 3)))

@@ -1,5 +1,6 @@
 """Pictures on a mesh of devices: rows shared out, what they look up whole on each device."""
 
+import dataclasses
 import functools
 
 import jax
@@ -87,10 +88,18 @@ def test_textures_keep_the_sharding_of_coordinates(rng):
     footprint = rng.normal(size=(8, 2, 2)).astype(np.float32)
     arguments, specs = (texture, uv, footprint), (WHOLE, ROWS, ROWS)
     check_sharded(imaging.sample_texture, arguments, specs, ROWS)
+
+
+@pytest.mark.slow
+def test_gradients_of_textures_keep_it_too(rng):
+    texture = rng.uniform(size=(4, 6, 3)).astype(np.float32)
+    uv = rng.uniform(-1, 2, size=(8, 2)).astype(np.float32)
+    footprint = rng.normal(size=(8, 2, 2)).astype(np.float32)
     gradient = jax.grad(lambda uv, t, f: jnp.sum(imaging.sample_texture(t, uv, f) ** 2))
     check_sharded(gradient, (uv, texture, footprint), (ROWS, WHOLE, ROWS), ROWS)
 
 
+@pytest.mark.slow
 def test_base_color_keeps_the_rows_of_the_raster(scene, rng):
     mesh, raster = scene
     codes = rng.integers(0, 256, size=(4, 6, 4), dtype=np.uint8)
@@ -105,6 +114,26 @@ def test_base_color_keeps_the_rows_of_the_raster(scene, rng):
 
     specs = (WHOLE, WHOLE, WHOLE, ROWS, ROWS, WHOLE, ROWS)
     check_sharded(color, (mesh.vertices, uv, chosen, *raster, footprint), specs, ROWS)
+
+
+@pytest.mark.slow
+def test_base_color_keeps_the_sharding_of_texels(rng):
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+    mesh = geometry.make_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+    part = geometry.BaseColor(texture=rng.integers(0, 256, size=(4, 6, 4), dtype=np.uint8))
+    mesh = dataclasses.replace(
+        mesh, uv=mesh.vertices[:, :2], face_material=0 * mesh.faces[:, 0], materials=(part,)
+    )
+    held = geometry.texels(mesh, 4)
+
+    def color(positions, normals, uv, face, barycentric):
+        at = geometry.Texels(
+            positions, normals, uv, face, barycentric, held.source, held.mesh, held.vertex
+        )
+        return imaging.base_color(mesh, at)
+
+    arrays = held.positions, held.normals, held.uv, held.face, held.barycentric
+    check_sharded(color, arrays, (ROWS,) * 5, ROWS)
 
 
 @pytest.mark.parametrize("curve", ["clip", "reinhard"])

@@ -8,7 +8,11 @@ from jax.test_util import check_grads
 
 from jaxsh.imaging import sample_texture
 
-WRAPS = ("repeat", "clamp", "mirror")
+WRAPS = (
+    "repeat",
+    pytest.param("clamp", marks=pytest.mark.slow),
+    pytest.param("mirror", marks=pytest.mark.slow),
+)
 
 
 def texel(picture, i, j, wrap):
@@ -76,6 +80,9 @@ def test_texels_are_where_the_convention_says(rng):
     u, v = (np.arange(4) + 0.5) / 4, 1 - (np.arange(3) + 0.5) / 3
     uv = jnp.asarray(np.stack(np.meshgrid(u, v), axis=-1))
     np.testing.assert_allclose(sample_texture(picture, uv), picture, rtol=0, atol=1e-14)
+    # Linear in texels: each look-up's weights sum to one.
+    gradient = jax.grad(lambda p: sample_texture(p, uv).sum())(picture)
+    np.testing.assert_allclose(gradient, 1, rtol=1e-12)
     # A step of the whole picture gives its mean, wherever; one of a texel changes nothing.
     whole = jnp.broadcast_to(jnp.eye(2), (3, 4, 2, 2))
     mean = jnp.broadcast_to(picture.mean((0, 1)), (3, 4, 2))
@@ -84,6 +91,7 @@ def test_texels_are_where_the_convention_says(rng):
     np.testing.assert_allclose(found, picture, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_a_fine_checkerboard_is_gray_from_far_and_itself_from_near():
     """What mip-mapping is for: without it, steps of three texels see black and white in turn."""
     board = jnp.asarray(np.indices((64, 64)).sum(0) % 2, jnp.float32)[..., None]
@@ -93,6 +101,7 @@ def test_a_fine_checkerboard_is_gray_from_far_and_itself_from_near():
     assert float(jnp.std(sample_texture(board, uv))) > 0.49
 
 
+@pytest.mark.slow
 def test_sampling_differentiates(rng):
     picture = jnp.asarray(rng.uniform(size=(5, 6, 2)))
     uv = jnp.asarray(rng.uniform(-1, 2, size=(12, 2)))
@@ -107,6 +116,7 @@ def test_sampling_differentiates(rng):
     np.testing.assert_allclose(gradient.sum(), 24, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_dtypes_and_nan(rng):
     for dtype in (jnp.float32, jnp.float64):
         picture = jnp.asarray(rng.uniform(size=(4, 4, 3)), dtype)
