@@ -117,11 +117,12 @@ def test_what_runs_on_the_host_takes_shared_arrays(scene, rng):
 def test_carry_keeps_the_sharding_of_texels(held, rng):
     values = rng.normal(size=(len(held.mesh.vertices), 2)).astype(np.float32)
 
-    def carry(face, barycentric, values):
-        shared = dataclasses.replace(held, face=face, barycentric=barycentric)
-        return shared.carry(values)
+    def carry(rows, values):
+        return dataclasses.replace(held, **rows).carry(values)
 
-    check_sharded(carry, (held.face, held.barycentric, values), (ROWS, ROWS, WHOLE), ROWS)
+    names = "positions", "normals", "uv", "face", "barycentric"
+    rows = {name: getattr(held, name) for name in names}
+    check_sharded(carry, (rows, values), (ROWS, WHOLE), ROWS)
 
 
 def test_images_keep_the_rows_of_the_picture(held, rng):
