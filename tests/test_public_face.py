@@ -21,6 +21,7 @@ REASONS = {
         "from_trimesh": HOST,
         "ray_scene": HOST,
         "read_mesh": NO_ARRAYS,
+        "read_points": NO_ARRAYS,
         "texels": HOST,
         "to_trimesh": HOST,
         "write_mesh": NO_ARRAYS,

@@ -15,6 +15,7 @@ from ._mesh import Mesh, vertex_normals
 from ._points import Points
 from ._rays import Hit, RayScene
 from ._read import read_mesh
+from ._read_points import read_points
 from ._texels import Surface, Texels, texels
 from ._topology import Topology, neighbors, topology
 from ._trace import Trace, trace
@@ -40,6 +41,7 @@ __all__ = [
     "neighbors",
     "ray_scene",
     "read_mesh",
+    "read_points",
     "texels",
     "to_trimesh",
     "topology",

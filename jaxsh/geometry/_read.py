@@ -90,7 +90,7 @@ def read_mesh(
         if not data.strip():
             raise ValueError("it is empty")
         polygons = _PARSERS[suffix](path, data)
-        _check(polygons)
+        _check(polygons, suffix)
     except Exception as error:  # a parser may raise anything when a file is damaged
         if isinstance(error, ImportError | MemoryError):
             raise
@@ -110,10 +110,12 @@ def read_mesh(
     )
 
 
-def _check(polygons: Polygons) -> None:
+def _check(polygons: Polygons, suffix: str) -> None:
     """Raise `ValueError` where there are no polygons, or one names a vertex that is none."""
     if len(polygons.sizes) == 0:
-        raise ValueError("it holds no faces")
+        points = len(polygons.positions) if suffix == ".ply" else 0
+        instead = f", but {points:,} points: those are for read_points" if points else ""
+        raise ValueError(f"it holds no faces{instead}")
     count = len(polygons.positions)
     wrong = (polygons.corners < 0) | (polygons.corners >= count)
     if wrong.any():

@@ -58,6 +58,14 @@ def calls():
         "read_mesh": of(
             g.read_mesh, **file, colors="srgb", **made, free="path normals origin", slow=True
         ),
+        "read_points": of(
+            g.read_points,
+            path="no such file.ply",
+            up="z",
+            origin=(0.0, 0.0, 0.0),
+            free="path origin",
+            slow=True,
+        ),
         "texels": of(g.texels, mesh=held.mesh, resolution=4, gutter=1, unwrap=False, host=True),
         "topology": of(g.topology, mesh=mesh, host=True),
         "trace": of(
