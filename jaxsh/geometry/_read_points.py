@@ -80,14 +80,15 @@ def read_points(
         normals = _turned(normals, up)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             length = np.linalg.norm(normals, axis=1, keepdims=True)
-            known = np.isfinite(length[:, 0]) & (length[:, 0] > 0)
+            usable = np.isfinite(length[:, 0]) & (length[:, 0] > 0)
             normals = normals / length
-        found.append((int((kept & ~known).sum()), "have no normal"))
-        kept &= known
+        found.append((int((kept & ~usable).sum()), "have no normal"))
+        kept &= usable
     else:
         normals = None
     if not kept.any():
-        raise ValueError(f"{path}: it holds no points" + (" that are known" if len(positions) else ""))
+        known = " that are known" if len(positions) else ""
+        raise ValueError(f"{path}: it holds no points{known}")
     if said := ", ".join(f"{n:,} points that {what} dropped" for n, what in found if n):
         warnings.warn(f"{path}: {said}", stacklevel=2)
     return Points(
