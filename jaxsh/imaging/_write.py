@@ -26,7 +26,8 @@ def write_image(
     .png and .jpg take what a screen shows (see `tone_map`), clip it to [0, 1] and round to 8
     bits. .exr and .hdr take linear radiance: .exr keeps float32 exactly (float16 as half), .hdr
     keeps 8 bits of the largest channel and no negative values. .jpg and .hdr have no alpha, and
-    alpha is not multiplied into colors. Makes missing folders and returns the path.
+    alpha is not multiplied into colors. The same picture gives the same bytes. Makes missing
+    folders and returns the path.
 
     Integers, uint8 or uint16, are no radiance and want `encoding="srgb"`: .png keeps them as they
     are, .jpg in 8 bits, and .exr and .hdr get the linear light that they stand for.
@@ -155,6 +156,9 @@ def _write(path: Path, pixels: np.ndarray) -> None:
     spec.attribute("oiio:UnassociatedAlpha", 1)
     spec.attribute("jpeg:subsampling", "4:4:4")
     spec.attribute("CompressionQuality", 95)
+    spec.attribute(
+        "DateTime", ""
+    )  # else OpenEXR's writer stores when it was: other bytes each time
     out = oiio.ImageOutput.create(str(path))
     if out is None:
         raise OSError(f"{path}: {oiio.geterror()}")

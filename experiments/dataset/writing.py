@@ -1,0 +1,98 @@
+"""Files of a dataset: each in its place once it is whole, so that a run goes on after another."""
+
+import contextlib
+import json
+import os
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxsh import imaging
+
+from ..runner import UserError
+
+ABOUT = "dataset.json"
+# Pictures that wait to be written, for each thread.
+_WAITING = 4
+
+
+def picture(path: Path, image: Any) -> int:
+    """Write a picture beside its place and move it there; its size in bytes."""
+    part = path.with_name(f"{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        imaging.write_image(part, np.asarray(image))
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    return path.stat().st_size
+
+
+def words(path: Path, content: Any) -> None:
+    """Write JSON, put in place when it is whole."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def claim(folder: Path, about: dict[str, Any]) -> None:
+    """Take a folder for a dataset: a new one, or one of the same settings that a run has left.
+
+    Raises `UserError` for anything else, which stays as it is.
+    """
+    path = folder / ABOUT
+    if not path.exists():
+        if folder.exists() and any(folder.iterdir()):
+            raise UserError(f"{str(folder)!r} holds no dataset: move it or choose --folder")
+        words(path, about)
+        return
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise UserError(f"{path}: no JSON ({error})") from error
+    wanted = json.loads(json.dumps(about))
+    if found != wanted:
+        keys = sorted({*found, *wanted}) if isinstance(found, dict) else []
+        other = [key for key in keys if found.get(key) != wanted.get(key)]
+        raise UserError(
+            f"{str(folder)!r} holds a dataset of other settings ({', '.join(other)}): choose "
+            "--folder, or move it"
+        )
+    for part in folder.rglob("*.part*"):  # of a run that was killed
+        part.unlink(missing_ok=True)
+
+
+class Writer:
+    """Writes pictures on threads, a few at a time: who gives one more waits for the first."""
+
+    def __init__(self, pool: ThreadPoolExecutor, threads: int):
+        self._pool, self._most = pool, _WAITING * threads
+        self._waiting: deque[Future[int]] = deque()
+        self.size = 0
+
+    def write(self, path: Path, image: Any) -> None:
+        """Write a picture, which may still be in the making, on a thread."""
+        while len(self._waiting) >= self._most:
+            self.size += self._waiting.popleft().result()
+        self._waiting.append(self._pool.submit(picture, path, image))
+
+    def finish(self) -> None:
+        """Wait for all."""
+        while self._waiting:
+            self.size += self._waiting.popleft().result()
+
+
+@contextlib.contextmanager
+def writer(threads: int) -> Iterator[Writer]:
+    """A writer whose pictures are all in place at the end, where nothing failed."""
+    pool = ThreadPoolExecutor(threads)
+    try:
+        written = Writer(pool, threads)
+        yield written
+        written.finish()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
