@@ -4,7 +4,6 @@ import dataclasses
 import functools
 import hashlib
 import math
-import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,8 +16,8 @@ from jaxtyping import Array, Float
 
 from jaxsh import geometry, imaging, transfer
 
-from ..devices.workers import peak_gigabytes
 from ..runner import Context, Table, UserError, experiment
+from ..shared.process import cores, peak_gigabytes
 from . import lights, sources, views, writing
 from .lights import Light
 
@@ -179,22 +178,13 @@ def _bake(config: Dataset, mesh: geometry.Mesh, folder: Path, seed: int) -> tran
             config.degree,
             directions=config.directions,
             bounces=config.bounces,
-            albedo=_albedo(mesh),
+            albedo=np.asarray(imaging.base_color(mesh).mean(axis=1)),
             seed=seed,
             store=folder / "transfer",
         )
     except ValueError as error:
         raise UserError(" ".join(str(error).split())) from error
     return jax.block_until_ready(baked)
-
-
-def _albedo(mesh: geometry.Mesh) -> np.ndarray:
-    """One number per vertex, for light that bounces."""
-    return np.asarray(jnp.mean(_colors(mesh), axis=1))
-
-
-def _colors(mesh: geometry.Mesh) -> Float[Array, "v 3"]:
-    return jnp.ones_like(mesh.vertices) if mesh.colors is None else mesh.colors[:, :3]
 
 
 def _scene(
@@ -214,7 +204,7 @@ def _scene(
 
 def _exposures(scene: _Scene, context: Context) -> list[float]:
     """What takes the 99th percentile of the vertices to white: one number for a light."""
-    colors = _colors(scene.mesh)
+    colors = imaging.base_color(scene.mesh)
     found = []
     for number in context.progress(range(len(scene.lights)), "lights"):
         shaded = scene.radiance(number) * colors
@@ -242,8 +232,8 @@ def _draw(
         for start in range(0, len(scene.lights), scene.kept)
     ]
     rounds = [(block, view) for block in blocks for view in range(len(scene.cameras))]
-    made, cores = 0, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
-    with writing.writer(cores) as writer:
+    made = 0
+    with writing.writer(cores()) as writer:
         for block, view in context.progress(rounds, "views"):
             images = folder / "images" / f"{view:04}"
             paths = {number: images / f"{number:04}.{config.format}" for number in block}
@@ -255,16 +245,12 @@ def _draw(
             raster = imaging.rasterize(
                 scene.mesh, scene.cameras[view], samples=config.samples, scene=scene.rays
             )
+            color = imaging.base_color(scene.mesh, raster)
             if buffers:
-                _buffers(scene, view, raster, about, buffers, writer)
+                _buffers(scene, view, raster, color, about, buffers, writer)
             for number, path in missing.items():
-                image = _picture(
-                    raster,
-                    scene.radiance(number) * _colors(scene.mesh),
-                    exposures[number],
-                    config.format,
-                )
-                writer.write(path, image)
+                radiance, exposure = scene.radiance(number), exposures[number]
+                writer.write(path, _picture(raster, radiance, color, exposure, config.format))
             made += len(missing)
     return made, writer.size
 
@@ -273,6 +259,7 @@ def _buffers(
     scene: _Scene,
     view: int,
     raster: imaging.Raster,
+    color: Float[Array, "hn wn 3"],
     folder: Path,
     wanted: list[str],
     writer: writing.Writer,
@@ -295,17 +282,21 @@ def _buffers(
     if "mask.png" in wanted:
         writer.write(folder / "mask.png", raster.alpha)
     if "albedo.png" in wanted:
-        albedo = imaging.interpolate(raster, _colors(scene.mesh))
+        albedo = imaging.interpolate(raster, jnp.ones_like(scene.mesh.vertices), color=color)
         writer.write(folder / "albedo.png", imaging.srgb_encode(jnp.clip(albedo, 0, 1)))
 
 
-@functools.partial(jax.jit, static_argnums=3)
+@functools.partial(jax.jit, static_argnames="form")
 def _picture(
-    raster: imaging.Raster, radiance: Float[Array, "v 3"], exposure: float, format: str
+    raster: imaging.Raster,
+    radiance: Float[Array, "v 3"],
+    color: Float[Array, "hn wn 3"],
+    exposure: float,
+    form: str,
 ) -> Float[Array, "h w 3"]:
-    image = imaging.interpolate(raster, radiance)
-    if format == "exr":
-        return jnp.minimum(image, 65504).astype(jnp.float16)
+    image = imaging.interpolate(raster, radiance, color=color)
+    if form == "exr":
+        return jnp.minimum(image, jnp.finfo(jnp.float16).max).astype(jnp.float16)
     return imaging.tone_map(image, exposure)
 
 
@@ -315,9 +306,10 @@ def _sheet(config: Dataset, scene: _Scene, exposures: list[float], path: Path) -
     for view in _some(len(scene.cameras), 3):
         camera = dataclasses.replace(scene.cameras[view], width=_SMALL, height=_SMALL)
         raster = imaging.rasterize(scene.mesh, camera, samples=3, scene=scene.rays)
+        color = imaging.base_color(scene.mesh, raster)
         row = [
-            _picture(raster, scene.radiance(n) * _colors(scene.mesh), exposures[n], "png")
-            for n in _some(len(scene.lights), 5)
+            _picture(raster, scene.radiance(number), color, exposures[number], "png")
+            for number in _some(len(scene.lights), 5)
         ]
         rows.append(np.concatenate(row, axis=1))
     imaging.write_image(path, np.concatenate(rows))

@@ -45,7 +45,7 @@ _PROFILE = [
 _FLUTES = 12
 
 
-def vase(rows: int = 120, columns: int = 144, texels: int = 512) -> geometry.Mesh:
+def vase(rows: int = 160, columns: int = 204, texels: int = 1024) -> geometry.Mesh:
     """A fluted vase, open on top, that shades its inside, under a texture of bands and dots."""
     from scipy.interpolate import PchipInterpolator
 
@@ -81,10 +81,14 @@ def vase(rows: int = 120, columns: int = 144, texels: int = 512) -> geometry.Mes
 
 
 def _glaze(size: int) -> UInt8[np.ndarray, "h w 4"]:
-    """Bands, and dots between them, in sRGB."""
+    """Bands, and dots on them, in sRGB; edges are as wide as a texel."""
     u, v = (np.arange(size) + 0.5) / size, 1 - (np.arange(size)[:, None] + 0.5) / size
-    clay, cream, blue = (np.array(c) for c in ((176, 84, 52), (232, 221, 196), (38, 70, 120)))
-    bands = (np.sin(2 * math.pi * 9 * v) > 0.2)[..., None] & np.ones((1, size, 1), bool)
-    dots = np.hypot((24 * u) % 1 - 0.5, (18 * v) % 1 - 0.5)[..., None] < 0.25
-    colors = np.where(bands, np.where(dots, blue, cream), clay).astype(np.uint8)
-    return np.concatenate([colors, np.full((size, size, 1), 255, np.uint8)], axis=2)
+    clay, cream, blue = (
+        np.array(color) for color in ((176, 84, 52), (232, 221, 196), (38, 70, 120))
+    )
+    # In texels from the edge, inwards.
+    bands = size / (2 * math.pi * 9) * (np.sin(2 * math.pi * 9 * v) - 0.2) * np.ones_like(u)
+    dots = size / 21 * (0.25 - np.hypot((24 * u) % 1 - 0.5, (18 * v) % 1 - 0.5))
+    band, dot = (np.clip(distance + 0.5, 0, 1)[..., None] for distance in (bands, dots))
+    colors = clay + band * (cream + dot * (blue - cream) - clay)
+    return np.concatenate([np.rint(colors), np.full((size, size, 1), 255)], 2).astype(np.uint8)

@@ -12,7 +12,8 @@ import numpy as np
 from jaxsh import geometry, transfer
 
 from ..runner import Context, Table, experiment
-from .workers import Counting, cores
+from ..shared.process import cores
+from .workers import Counting
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,13 +16,12 @@ import numpy as np
 from jaxsh import geometry, transfer
 
 from ..runner import Context, Table, experiment
+from ..shared.process import cores, peak_gigabytes
 from .workers import (
     Counting,
-    cores,
     cpu_seconds,
     folder_bytes,
     in_a_process,
-    peak_gigabytes,
     processes,
     read_seconds,
     tasks_per_second,
