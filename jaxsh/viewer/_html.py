@@ -13,6 +13,7 @@ from jaxtyping import ArrayLike, Float, Int
 
 from .._core.checks import as_path
 from .._core.files import check_place, put_in_place
+from ..geometry import Mesh
 from ..imaging import Camera
 from ..transfer import Material, Transfer
 from ._lamp import Lamp
@@ -25,9 +26,10 @@ def export_html(
     path: str | os.PathLike[str],
     transfer: Transfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
-    faces: Int[ArrayLike, "f 3"],
-    albedo: Float[ArrayLike, "..."] | Material = 0.8,
+    faces: Int[ArrayLike, "f 3"] | Mesh,
+    albedo: Float[ArrayLike, "..."] | Material | None = None,
     *,
+    textured: bool | None = None,
     camera: Camera | None = None,
     exposure: float | None = None,
     names: Sequence[str] | None = None,
@@ -56,10 +58,14 @@ def export_html(
     - `light`: coefficients (3, K), or (n, 3, K) for several that a menu chooses from; of degree 10
       and the transfer's at most. What the transfer has beyond the light's degree is not written.
       None with a sky or a lamp alone, which are of the transfer's degree.
-    - `faces`: (f, 3), the mesh's.
+    - `faces`: (f, 3), the mesh's; or the `geometry.Mesh` itself, whose materials, textures and
+      vertex colors can then be shown.
     - `albedo`: a number, RGB (3,), or per vertex (V, 1) or (V, 3); or a `transfer.Material` with
       one specular albedo, a number or (3,), and one exponent, for `transfer.shade_glossy` towards
-      the camera. Under a lamp the diffuse part alone is shown.
+      the camera; under a lamp the diffuse part alone is shown. By default the base color of a
+      mesh that has one, and 0.8 elsewhere.
+    - `textured`: whether the mesh's base color, at each pixel as by `imaging.base_color`,
+      multiplies the diffuse albedo: by default where no albedo is given. Textures go as PNG.
     - `camera`: where the picture starts; by default `imaging.Camera.facing` the mesh. A window of
       another shape than its picture shows more beside or above it, never less.
     - `exposure`: the factor of linear radiance from which the exposure's slider counts; by default
@@ -95,6 +101,7 @@ def export_html(
         light,
         faces,
         albedo,
+        textured=textured,
         camera=camera,
         exposure=exposure,
         names=names,

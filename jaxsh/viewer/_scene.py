@@ -10,9 +10,7 @@ from jaxtyping import ArrayLike, Float, Int
 
 from .._core.checks import (
     as_finite,
-    as_host_integer,
     check_all,
-    check_faces,
     check_finite,
     check_known,
     check_number,
@@ -25,6 +23,7 @@ from ._gloss import gloss_facts, split_material
 from ._lamp import Lamp
 from ._lights import make_lights, shaded
 from ._sky import Sky
+from ._surface import Surface, make_surface, tinted
 from ._values import packed_values
 
 # WebGL2 promises textures of 2048 texels along a side.
@@ -33,10 +32,15 @@ _MOST_CODE = 32767  # of int16
 
 
 class Scene(NamedTuple):
-    """Holds a header, which JSON takes, and the bytes of the arrays that it names, in order."""
+    """Holds a header, which JSON takes, and the bytes of the arrays that it names, in order.
+
+    Beside these, what was drawn and with which albedo, for a picture by Python.
+    """
 
     header: dict[str, Any]
     arrays: bytes
+    surface: Surface
+    albedo: Any
 
 
 class Codes(NamedTuple):
@@ -49,9 +53,10 @@ class Codes(NamedTuple):
 def make_scene(
     transfer: Transfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
-    faces: Int[ArrayLike, "f 3"],
-    albedo: Float[ArrayLike, "..."] | Material,
+    faces: Int[ArrayLike, "f 3"] | Mesh,
+    albedo: Float[ArrayLike, "..."] | Material | None,
     *,
+    textured: bool | None,
     camera: Camera | None,
     exposure: float | None,
     names: Sequence[str] | None,
@@ -69,7 +74,8 @@ def make_scene(
     count = transfer.num_points
     if count > _ROW * _MOST_ROWS:
         raise ValueError(f"expected at most {_ROW * _MOST_ROWS} points of transfer, got {count}")
-    corners = _checked_faces(faces, count)
+    surface, albedo = make_surface(faces, transfer, albedo, textured)
+    corners = surface.faces
     diffuse, material = split_material(albedo)
     shared, codes = _packed_albedo(diffuse, count)
     value_facts, value_codes = packed_values(values, count)
@@ -89,6 +95,8 @@ def make_scene(
         # What the whole mesh sends out stands for what a picture shows of it.
         first = lights.kinds[0], lights.coefficients[0]
         sent = shaded(*first, transfer, albedo, camera.position, lamp)
+        if surface.tinted:
+            sent = tinted(surface, sent, shaded(*first, transfer, diffuse, camera.position, lamp))
         exposure = float(auto_exposure(sent[None]))
     rows = math.ceil(count / _ROW)
     layers = in_layers(rounded.codes, rows)
@@ -109,6 +117,7 @@ def make_scene(
         "rows": rows,
         "layers": len(layers),
         "values": value_facts,
+        "surface": surface.facts,
     }
     header |= lights.facts
     if material is not None:
@@ -124,17 +133,18 @@ def make_scene(
         arrays["normals"] = np.where(defined, normals, 0).astype("<f4")
     if codes is not None:
         arrays["albedoCodes"] = codes.astype("<u2")
-    return packed(header, arrays | value_codes)
+    named, joined = packed(header, arrays | surface.arrays | value_codes)
+    return Scene(named, joined, surface, albedo)
 
 
-def packed(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Scene:
+def packed(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> tuple[dict[str, Any], bytes]:
     """Name arrays, little-endian, in the header and join their bytes, each from a multiple of 4."""
     facts = [
         {"name": name, "type": array.dtype.str[1:], "length": array.size}
         for name, array in arrays.items()
     ]
     parts = [array.tobytes() + bytes(-array.nbytes % 4) for array in arrays.values()]
-    return Scene(header | {"arrays": facts}, b"".join(parts))
+    return header | {"arrays": facts}, b"".join(parts)
 
 
 def checked_names(names: Any, default: list[str]) -> list[str]:
@@ -164,14 +174,6 @@ def in_layers(codes: np.ndarray, rows: int) -> np.ndarray:
     texels = np.zeros((rows * _ROW, layers * 4), np.int16)
     texels[:count, :width] = codes
     return texels.reshape(rows * _ROW, layers, 4).swapaxes(0, 1)
-
-
-def _checked_faces(faces: Any, count: int) -> np.ndarray:
-    array = as_host_integer(faces, "faces")
-    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
-        raise ValueError(f"expected faces (f, 3), at least one, got shape {array.shape}")
-    check_faces("the mesh", array, count)
-    return array.astype(np.int32)
 
 
 def _ball_around(positions: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, float]:

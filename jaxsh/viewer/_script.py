@@ -6,7 +6,17 @@ from importlib.resources import files
 
 # Each after those that it imports from.
 _MODULES = (
-    *("harmonics", "vectors", "scene", "sides", "gl", "controls", "renderer"),
+    *(
+        "harmonics",
+        "vectors",
+        "scene",
+        "pictures",
+        "sides",
+        "gl",
+        "controls",
+        "surface",
+        "renderer",
+    ),
     *("sky", "near", "factors", "near_shading", "python_text"),
     *("handle", "lamp_handle", "sun_handle", "light_parts", "glossy", "glossy_part", "parts"),
     *("ball", "pointer", "view", "save"),

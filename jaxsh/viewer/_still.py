@@ -8,10 +8,12 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from ..geometry import Mesh
-from ..imaging import Camera, interpolate, rasterize, tone_map
+from ..imaging import Camera, base_color, interpolate, rasterize, tone_map
 from ..transfer import Material, Transfer
+from ._gloss import split_material
 from ._lamp import Lamp
 from ._lights import shaded
+from ._surface import Surface
 
 
 class Still:
@@ -20,14 +22,15 @@ class Still:
     def __init__(
         self,
         transfer: Transfer,
-        faces: ArrayLike,
+        surface: Surface,
         albedo: ArrayLike | Material,
         height: int,
         lamp: Lamp | None = None,
     ):
         self.transfer, self.albedo, self.height, self.lamp = transfer, albedo, height, lamp
-        faces = jnp.asarray(np.asarray(faces, np.int32))
-        self.mesh = Mesh(transfer.positions, faces, transfer.normals)
+        faces = jnp.asarray(surface.faces)
+        self.surface = surface
+        self.mesh = surface.mesh or Mesh(transfer.positions, faces, transfer.normals)
 
     def png(self, light: Float[np.ndarray, "3 k"], header: dict[str, Any]) -> bytes:
         """A PNG with the ground transparent, four samples in a pixel."""
@@ -41,7 +44,13 @@ class Still:
         raster = rasterize(self.mesh, camera, samples=2)
         first = header["kinds"][0], light
         sent = shaded(*first, self.transfer, self.albedo, camera.position, self.lamp)
-        return _encoded(interpolate(raster, sent), raster.alpha, header["exposure"])
+        seen = interpolate(raster, sent)
+        if self.surface.tinted:
+            diffuse, _ = split_material(self.albedo)
+            white = shaded(*first, self.transfer, diffuse, camera.position, self.lamp)
+            color = base_color(self.mesh, raster).astype(white.dtype)
+            seen = interpolate(raster, sent - white) + interpolate(raster, white, color=color)
+        return _encoded(seen, raster.alpha, header["exposure"])
 
 
 def _encoded(radiance: Float[Array, "h w 3"], alpha: Float[Array, "h w"], exposure: float) -> bytes:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float, Int
 
 from .._core.checks import check_size
+from ..geometry import Mesh
 from ..imaging import Camera
 from ..transfer import Material, Transfer
 from ._lamp import Lamp, checked_place
@@ -25,9 +26,10 @@ if TYPE_CHECKING:
 def view(
     transfer: Transfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
-    faces: Int[ArrayLike, "f 3"],
-    albedo: Float[ArrayLike, "..."] | Material = 0.8,
+    faces: Int[ArrayLike, "f 3"] | Mesh,
+    albedo: Float[ArrayLike, "..."] | Material | None = None,
     *,
+    textured: bool | None = None,
     camera: Camera | None = None,
     exposure: float | None = None,
     names: Sequence[str] | None = None,
@@ -70,6 +72,7 @@ def view(
         light,
         faces,
         albedo,
+        textured=textured,
         camera=camera,
         exposure=exposure,
         names=names,
@@ -78,7 +81,9 @@ def view(
         sky=sky,
         lamp=lamp,
     )
-    return _widget_class()(scene, height, Still(transfer, faces, albedo, height, lamp))
+    return _widget_class()(
+        scene, height, Still(transfer, scene.surface, scene.albedo, height, lamp)
+    )
 
 
 @functools.cache

@@ -13,7 +13,7 @@ const { about, axesOf, clipMatrix, dot, minus, multiply, orbited } = await load(
 const { decompressed, unpacked } = await load("scene");
 
 const { rampColor } = await load("ramp");
-const { rayAt, transferOf, vertexAt } = await load("picking");
+const { rayAt, transferOf, pointUnder } = await load("picking");
 const { shortNumber } = await load("color_bar");
 const { pythonText } = await load("python_text");
 
@@ -105,7 +105,7 @@ test("a vertex's transfer is what Python sent, to 16 bits", async () => {
 test("a click finds the vertex that rays find", async () => {
   const scene = unpacked(header, await decompressed(text));
   for (const { origin, direction, expected } of picked) {
-    assert.equal(vertexAt(scene, { origin, direction }), expected);
+    assert.equal(pointUnder(scene, { origin, direction }), expected);
   }
   assert.ok(new Set(picked.map(({ expected }) => expected)).size > 5);
   const { camera, points, pixels } = cameras[1];

@@ -50,3 +50,37 @@ def chromium() -> str | None:
     names = ("chromium", "chromium-browser", "google-chrome")
     found = [path for name in names if (path := shutil.which(name))]
     return os.environ.get("CHROMIUM") or (found[0] if found else None)
+
+
+@functools.cache
+def textured(rows: int = 24, columns: int = 48) -> geometry.Mesh:
+    """A sphere with UV, colors of its vertices, and two materials with a texture each, or none."""
+    rng = np.random.default_rng(18)
+    v, u = np.meshgrid(np.linspace(0, 1, rows + 1), np.linspace(0, 1, columns + 1), indexing="ij")
+    theta, phi = np.pi * (1 - v.ravel()), 2 * np.pi * u.ravel()
+    ring = np.sin(theta)
+    points = np.stack([ring * np.cos(phi), ring * np.sin(phi), np.cos(theta)], axis=1)
+    at = np.arange(rows * (columns + 1)).reshape(rows, columns + 1)[:, :-1].ravel()
+    low = np.stack([at, at + 1, at + columns + 2], axis=1)
+    high = np.stack([at, at + columns + 2, at + columns + 1], axis=1)
+    # Those at a pole have no area.
+    faces = np.concatenate([low[columns:], high[:-columns]]).astype(np.int32)
+    third = (points[faces].mean(axis=1)[:, 2] > 0.4).astype(np.int32)
+    third[points[faces].mean(axis=1)[:, 2] < -0.5] = -1
+
+    def texture(height, width):
+        picture = rng.integers(60, 256, (height, width, 4)).astype(np.uint8)
+        picture[..., 3] = 255
+        return picture
+
+    materials = (
+        geometry.BaseColor("belt", (0.9, 0.8, 0.7, 1.0), texture(4, 8)),
+        geometry.BaseColor("cap", (0.5, 0.9, 0.6, 1.0), texture(3, 5)),
+    )
+    colors = np.stack([0.6 + 0.4 * u.ravel(), 0.5 + 0.5 * v.ravel(), 1 - 0.5 * v.ravel()], axis=1)
+    colors = np.concatenate([colors, np.ones((len(colors), 1))], axis=1)
+    arrays = (points, points, np.stack([u.ravel(), v.ravel()], axis=1), colors)
+    points, normals, uv, colors = (jnp.asarray(one, jnp.float32) for one in arrays)
+    return geometry.Mesh(
+        points, jnp.asarray(faces), normals, uv, colors, jnp.asarray(third), materials
+    )

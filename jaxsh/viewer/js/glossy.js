@@ -4,6 +4,7 @@
 import { floatTexture, nearest } from "./gl.js";
 import { basis } from "./harmonics.js";
 import { DIFFUSE, TEXEL } from "./renderer.js";
+import { shinesApart } from "./surface.js";
 
 const GROUP = 16; // directions in a pass: four outputs of four numbers
 
@@ -59,6 +60,7 @@ in vec3 albedo;
 in vec3 position;
 in vec3 normal;
 out vec3 radiance;
+${shinesApart(scene) ? "out vec3 shine;" : ""}
 vec3 towards(vec3 v) {
   float size = length(v);
   return size > 0.0 ? v / size : v;
@@ -79,7 +81,9 @@ void main() {
       glossy += some[j] * value * texelFetch(nodes, ivec2(4 * i + j, 1), 0).rgb;
     }
   }
-  radiance = albedo * diffuse + specular * glossy;
+  ${shinesApart(scene)
+    ? "radiance = albedo * diffuse;\n  shine = specular * glossy;"
+    : "radiance = albedo * diffuse + specular * glossy;"}
 }`;
 };
 
@@ -94,7 +98,8 @@ export class GlossyShading {
     this.groups = Math.ceil(nodes.length / GROUP);
     this.values = nodes.map((node) => Float32Array.from(basis(node, scene.degree)));
     this.#sample();
-    this.program = renderer.shading(SHADE_GLOSSY(scene, this.groups));
+    const outputs = shinesApart(scene) ? ["radiance", "shine"] : ["radiance"];
+    this.program = renderer.shading(SHADE_GLOSSY(scene, this.groups), outputs);
     this.nodes = floatTexture(gl, NODES_UNIT, GROUP * this.groups, 2);
     this.sent = new Float32Array(4 * GROUP * this.groups * 2);
     nodes.forEach((node, i) => this.sent.set(node, 4 * i));
@@ -168,6 +173,6 @@ export class GlossyShading {
     gl.uniform1fv(at("lobe"), lobe);
     gl.uniform3fv(at("eye"), eye);
     gl.uniform3fv(at("specular"), specular);
-    this.renderer.run(side);
+    this.renderer.run(side, true);
   }
 }

@@ -64,6 +64,7 @@ export class Overlay {
     this.card.hidden = vertex === null;
     if (vertex === null) return;
     const { viewer } = this;
+    const { texels, tinted } = viewer.scene.surface;
     const at = [0, 1, 2].map((i) => shortNumber(viewer.scene.positions[3 * vertex + i]));
     const sent = Array.from(viewer.radianceOf(vertex), shortNumber);
     const close = make("button", { type: "button", title: "Close (Escape)" }, "×");
@@ -74,9 +75,9 @@ export class Overlay {
       make("span", { className: `jaxsh-${sign}` }, sign));
     this.card.replaceChildren(
       close,
-      make("b", {}, `Vertex ${vertex}`),
+      make("b", {}, `${texels ? "Texel" : "Vertex"} ${vertex}`),
       line("at ", at.join(", ")),
-      line("sends out ", sent.join(", ")),
+      line(tinted ? "sends out, if white " : "sends out ", sent.join(", ")),
       ...viewer.scene.values.map((facts) => line(`${facts.name} `, viewer.valueOf(facts, vertex))),
       line("transfer: ", signs[0], ", ", signs[1]),
     );

@@ -9,10 +9,23 @@ export function rayAt(camera, [x, y], aspect) {
   return { origin: camera.position, direction };
 }
 
-// The vertex nearest to where a ray first meets the mesh, or null. All faces are tried, by Möller &
-// Trumbore 1997.
-export function vertexAt({ positions, faces }, { origin, direction }) {
-  const point = (vertex) => [0, 1, 2].map((i) => positions[3 * vertex + i]);
+// The point of the transfer nearest to where a ray first meets the mesh, or null: a vertex, or a texel.
+export function pointUnder(scene, ray) {
+  const hit = hitOf(scene, ray);
+  if (!hit) return null;
+  const { corners, weights } = hit;
+  const { texels } = scene.surface;
+  if (!texels) return corners[weights.indexOf(Math.max(...weights))];
+  const [u, v] = [0, 1].map((i) => weights.reduce((sum, x, k) => sum + x * scene.uv[2 * corners[k] + i], 0));
+  const inside = (x, count) => Math.min(count - 1, Math.max(0, Math.floor(x * count)));
+  const texel = scene.source[inside(1 - v, texels.height) * texels.width + inside(u, texels.width)];
+  return texel < 0 ? null : texel;
+}
+
+// The corners of the face that a ray first meets, and their weights; null where it meets none. All faces
+// are tried, by Möller & Trumbore 1997.
+function hitOf({ positions, vertices = positions, faces }, { origin, direction }) {
+  const point = (vertex) => [0, 1, 2].map((i) => vertices[3 * vertex + i]);
   let [best, found] = [Infinity, null];
   for (let face = 0; face < faces.length; face += 3) {
     const a = point(faces[face]);
@@ -28,8 +41,7 @@ export function vertexAt({ positions, faces }, { origin, direction }) {
     const distance = dot(ac, over) / determinant;
     if (v < 0 || u + v > 1 || distance <= 0 || distance >= best) continue;
     best = distance;
-    const weights = [1 - u - v, u, v];
-    found = faces[face + weights.indexOf(Math.max(...weights))];
+    found = { corners: faces.slice(face, face + 3), weights: [1 - u - v, u, v] };
   }
   return found;
 }

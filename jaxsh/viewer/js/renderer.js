@@ -1,5 +1,6 @@
 // Shades the vertices on the graphics processor, once per light, and draws the mesh.
 import { fill, nearest, program } from "./gl.js";
+import { HAND_ON, SENT, SURFACE_PLACES, Surface, shinesApart } from "./surface.js";
 import { clipMatrix, dot, minus } from "./vectors.js";
 
 // Transfer as 16-bit integers, four coefficients in a texel, vertices along the rows of a layer: the
@@ -32,13 +33,12 @@ const NOTHING = `#version 300 es
 precision highp float;
 void main() {}`;
 
-const PLACE = `#version 300 es
+const PLACE = (scene) => `#version 300 es
 uniform mat4 camera;
 in vec3 position;
-in vec3 radiance;
-out vec3 seen;
+${HAND_ON(scene)}
 void main() {
-  seen = radiance;
+  handOn();
   gl_Position = camera * vec4(position, 1.0);
 }`;
 
@@ -50,20 +50,19 @@ vec3 shownColor(vec3 linear) {
   return mix(power, 12.92 * x, lessThanEqual(x, vec3(0.0031308)));
 }`;
 
-const SHOW = `#version 300 es
+const SHOW = (scene) => `#version 300 es
 precision highp float;
 uniform float exposure;
-in vec3 seen;
 out vec4 shown;
+${SENT(scene)}
 ${SHOWN_COLOR}
 void main() {
-  shown = vec4(shownColor(exposure * seen), 1.0);
+  shown = vec4(shownColor(exposure * sent()), 1.0);
 }`;
 
 // Attributes of shading, and of drawing.
 const SHADED = { albedo: 0, position: 1, normal: 2 };
-export const POSITION = 0;
-export const RADIANCE = 1;
+export const DRAWN = { position: 0, radiance: 1, ...SURFACE_PLACES };
 
 export class Renderer {
   // Throws an Error, in words, where WebGL2 or memory is lacking.
@@ -74,7 +73,7 @@ export class Renderer {
     this.gl = gl;
     this.scene = scene;
     const shade = this.shading(SHADE(scene));
-    const show = program(gl, PLACE, SHOW, { position: POSITION, radiance: RADIANCE });
+    const show = program(gl, PLACE(scene), SHOW(scene), DRAWN);
     this.shadeProgram = shade;
     this.showProgram = show;
     this.lightAt = gl.getUniformLocation(shade, "light");
@@ -98,23 +97,30 @@ export class Renderer {
     nearest(gl, gl.TEXTURE_2D_ARRAY);
   }
 
-  // Two sides, A and B, have the mesh in common; each has radiance of its own.
+  // Two sides, A and B, have the mesh in common; each has radiance of its own. Of texels, points that
+  // are not the mesh's vertices, there is room for whole rows.
   #sendMesh() {
     const { gl, scene } = this;
     const [positions, faces] = [gl.createBuffer(), gl.createBuffer()];
+    const { texels } = scene.surface;
+    const bytes = texels ? 12 * scene.rows * scene.rowLength : 4 * scene.positions.length;
     this.positions = positions;
-    fill(gl, gl.ARRAY_BUFFER, positions, scene.positions);
+    this.surface = new Surface(gl, scene);
+    fill(gl, gl.ARRAY_BUFFER, positions, scene.vertices ?? scene.positions);
     fill(gl, gl.ELEMENT_ARRAY_BUFFER, faces, scene.faces);
     this.sides = [0, 1].map(() => {
       const side = { arrays: gl.createVertexArray(), radiance: gl.createBuffer() };
       gl.bindVertexArray(side.arrays);
       gl.bindBuffer(gl.ARRAY_BUFFER, positions);
-      gl.enableVertexAttribArray(POSITION);
-      gl.vertexAttribPointer(POSITION, 3, gl.FLOAT, false, 0, 0);
+      gl.enableVertexAttribArray(DRAWN.position);
+      gl.vertexAttribPointer(DRAWN.position, 3, gl.FLOAT, false, 0, 0);
       gl.bindBuffer(gl.ARRAY_BUFFER, side.radiance);
-      gl.bufferData(gl.ARRAY_BUFFER, 4 * scene.positions.length, gl.DYNAMIC_COPY);
-      gl.enableVertexAttribArray(RADIANCE);
-      gl.vertexAttribPointer(RADIANCE, 3, gl.FLOAT, false, 0, 0);
+      gl.bufferData(gl.ARRAY_BUFFER, bytes, gl.DYNAMIC_COPY);
+      if (!texels) {
+        gl.enableVertexAttribArray(DRAWN.radiance);
+        gl.vertexAttribPointer(DRAWN.radiance, 3, gl.FLOAT, false, 0, 0);
+      }
+      Object.assign(side, this.surface.side(bytes));
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, faces);
       gl.bindVertexArray(null);
       return side;
@@ -132,6 +138,7 @@ export class Renderer {
       gl.vertexAttribPointer(SHADED.albedo, 3, gl.UNSIGNED_SHORT, true, 0, 0);
     }
     gl.bindBuffer(gl.ARRAY_BUFFER, this.positions);
+    if (scene.vertices) fill(gl, gl.ARRAY_BUFFER, gl.createBuffer(), scene.positions);
     gl.enableVertexAttribArray(SHADED.position);
     gl.vertexAttribPointer(SHADED.position, 3, gl.FLOAT, false, 0, 0);
     if (scene.normals) {
@@ -169,9 +176,13 @@ export class Renderer {
     return program(this.gl, source, NOTHING, SHADED, outputs);
   }
 
-  // Runs the shading program in use for the vertices of a side.
-  run(side) {
-    this.capture([this.sides[side].radiance]);
+  // Runs the shading program in use for the vertices of a side; one of gloss makes `shine` as well where
+  // that is apart.
+  run(side, glossy = false) {
+    const { radiance, shine } = this.sides[side];
+    const shines = glossy && shinesApart(this.scene);
+    this.capture(shines ? [radiance, shine] : [radiance]);
+    this.surface.shaded(this.sides[side], shines);
   }
 
   // The same, each output into a buffer.
@@ -205,13 +216,13 @@ export class Renderer {
   // bottom, its width and height. Without `look`, a program that takes the same attributes and
   // uniforms, in its colors.
   draw(camera, exposure, rectangle, side = 0, look = this.showProgram) {
-    const { gl, scene } = this;
+    const { gl } = this;
     gl.viewport(...rectangle);
     gl.useProgram(look);
     gl.uniformMatrix4fv(gl.getUniformLocation(look, "camera"), false, this.matrix(camera, rectangle));
     gl.uniform1f(gl.getUniformLocation(look, "exposure"), exposure);
     gl.bindVertexArray(this.sides[side].arrays);
-    gl.drawElements(gl.TRIANGLES, scene.faces.length, gl.UNSIGNED_INT, 0);
+    this.surface.draw(look, this.sides[side]);
     gl.bindVertexArray(null);
   }
 

@@ -8,7 +8,7 @@ import { Lobe } from "./lobe.js";
 import { Overlay } from "./overlay.js";
 import { makePanel } from "./panel.js";
 import { PARTS } from "./parts.js";
-import { rayAt, vertexAt } from "./picking.js";
+import { pointUnder, rayAt } from "./picking.js";
 import { listenToDrags, listenToKeys, listenToWheel } from "./pointer.js";
 import { copied, pythonText } from "./python_text.js";
 import { Renderer } from "./renderer.js";
@@ -193,7 +193,7 @@ export class Viewer {
     const [left, top, width, height] = this.#sideAt(x, y);
     const place = [(2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height];
     const ray = rayAt(this.shared.camera, x === undefined ? [0, 0] : place, width / height);
-    const vertex = vertexAt(this.scene, ray);
+    const vertex = pointUnder(this.scene, ray);
     if (vertex === null && x === undefined) this.overlay.say("No vertex in the middle");
     this.set({ vertex });
   }

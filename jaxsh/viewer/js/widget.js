@@ -1,10 +1,12 @@
 // The viewer as a widget of a notebook (anywidget): the mesh comes as a message once the page asks
 // for it, so that a saved notebook does not hold it.
+import { withPictures } from "./pictures.js";
 import { unpacked } from "./scene.js";
 import { Viewer } from "./viewer.js";
 
 function render({ model, el }) {
   let viewer;
+  let [asked, left] = [false, false];
   // An element of our own, since the notebook sets the height of its.
   const root = el.appendChild(document.createElement("div"));
   root.style.height = `${model.get("height")}px`;
@@ -19,13 +21,16 @@ function render({ model, el }) {
     known = all;
     viewer.set(Object.fromEntries(fresh));
   };
-  const received = (message, buffers) => {
-    if (message.kind !== "scene" || viewer) return;
+  const received = async (message, buffers) => {
+    if (message.kind !== "scene" || asked) return;
+    asked = true;
     const view = buffers[0];
     // A copy, since its start need not be where numbers may stand.
     const bytes = view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength);
     try {
-      viewer = new Viewer(root, unpacked(message.header, bytes));
+      const scene = await withPictures(unpacked(message.header, bytes));
+      if (left) return;
+      viewer = new Viewer(root, scene);
       lights();
       moved();
     } catch (error) {
@@ -40,6 +45,7 @@ function render({ model, el }) {
     model.off("msg:custom", received);
     model.off("change:lights", lights);
     model.off("change:moved", moved);
+    left = true;
     viewer?.release();
   };
 }
