@@ -49,6 +49,7 @@ REASONS = {
         "studio": NO_ARRAYS,
         "write_image": NO_ARRAYS,
         "write_light": HOST,
+        "write_lightmap": HOST,
         "write_movie": NO_ARRAYS,
         "write_relit": HOST,
         "write_splats": HOST,

@@ -11,6 +11,7 @@ from ._camera import Camera
 from ._display import auto_exposure, psnr, srgb_decode, srgb_encode, tone_map
 from ._environment import read_environment, studio
 from ._light import read_light, write_light
+from ._lightmap import write_lightmap
 from ._movie import write_movie
 from ._raster import Raster, interpolate, rasterize
 from ._relit import write_relit
@@ -39,6 +40,7 @@ __all__ = [
     "tone_map",
     "write_image",
     "write_light",
+    "write_lightmap",
     "write_movie",
     "write_relit",
     "write_splats",

@@ -11,36 +11,37 @@ from jaxtyping import ArrayLike, Float
 
 from .._core import srgb
 from .._core.checks import as_finite, as_path, check_choice, check_flag, check_number, check_type
-from ..geometry import BaseColor, Mesh, write_mesh
+from ..geometry import BaseColor, Mesh, Texels, write_mesh
 from ._display import auto_exposure
 
 
 def write_relit(
     path: str | os.PathLike[str],
-    mesh: Mesh,
+    surface: Mesh | Texels,
     radiance: Float[ArrayLike, "v 3"],
     *,
     exposure: float | None = None,
     textured: bool = False,
     up: Literal["z", "y"] | None = None,
 ) -> Path:
-    """Write a mesh to a GLB or PLY file with its shading as colors, and return the path.
+    """Write a mesh to a GLB or PLY file as it is shaded, and return the path.
 
     What is seen there is `tone_map(radiance, exposure)`, whatever lights the program has. A GLB
     says so by the extension KHR_materials_unlit, which three.js, Babylon.js, model-viewer, Blender
-    and Unreal know; its vertex colors are linear floats. A PLY has them as sRGB in 8 bits, as
-    MeshLab and Blender take them. Positions and normals are written as by `geometry.write_mesh`, UV
-    only where they place a texture.
+    and Unreal know; its vertex colors are linear floats, and light at texels is a texture of 8 bits
+    inside. A PLY has vertex colors as sRGB in 8 bits, as MeshLab and Blender take them. Positions
+    and normals are written as by `geometry.write_mesh`, UV only where they place a texture.
 
     **Arguments**
 
     - `path`: of the file, .glb or .ply, which is replaced. Missing folders are made.
-    - `mesh`: the V vertices that are shaded.
+    - `surface`: a mesh, whose V vertices are shaded, or the V texels of `geometry.texels`, for a
+      .glb; with these `texels.mesh` is written.
     - `radiance`: (V, 3), linear, as from `transfer.shade_diffuse`. Below 0, where a light rings, it
       is black.
     - `exposure`: what it is multiplied by before it is cut at 1: by default `auto_exposure` of it.
       Give one number to files that are to be compared.
-    - `textured`: leave the mesh its materials, textures and vertex colors, in a .glb: they
+    - `textured`: leave a mesh its materials, textures and vertex colors, in a .glb: they
       multiply the radiance at each pixel, which is then to be that of a white surface (albedo 1).
       Light is cut at 1 before it is multiplied, as glTF asks for.
     - `up`: the axis of the file that points up, as in `write_mesh`.
@@ -63,20 +64,26 @@ def write_relit(
     True
     """
     path, textured = as_path(path), check_flag("textured", textured)
-    check_type("mesh", mesh, Mesh)
+    check_type("surface", surface, Mesh, Texels)
     suffix = path.suffix.lower()
     if suffix not in (".glb", ".ply"):
         raise ValueError(f"{path}: cannot write {suffix or 'no extension'}, only .glb and .ply")
     if up is not None:
         check_choice("up", up, ("z", "y"))
-    shown = _shown(radiance, len(mesh.vertices), exposure)
+    if isinstance(surface, Texels):
+        if suffix == ".ply" or textured:
+            why = "a .ply has no textures" if suffix == ".ply" else "a material has one texture"
+            raise ValueError(f"{path}: {why}: expected a mesh as surface, got Texels")
+        shown = _shown(radiance, surface.num_points, exposure)
+        return write_mesh(path, _with_picture(surface, shown), up=up)
+    shown = _shown(radiance, len(surface.vertices), exposure)
     if textured:
-        return write_mesh(path, _lit(path, mesh, shown), up=up)
+        return write_mesh(path, _lit(path, surface, shown), up=up)
     opaque = np.concatenate([shown, np.ones_like(shown[:, :1])], axis=1)
     if suffix == ".ply":
         codes = np.rint(255 * srgb.encode(opaque[:, :3]))
         opaque[:, :3] = srgb.decode(codes / 255)
-    return write_mesh(path, _plain(mesh, opaque, suffix), up=up)
+    return write_mesh(path, _plain(surface, opaque, suffix), up=up)
 
 
 def _shown(radiance: Any, count: int, exposure: float | None) -> Float[np.ndarray, "v 3"]:
@@ -88,6 +95,22 @@ def _shown(radiance: Any, count: int, exposure: float | None) -> Float[np.ndarra
         exposure = float(auto_exposure(light[None]))
     exposure = check_number("exposure", exposure, above=0.0)
     return np.clip(exposure * np.asarray(light, np.float64), 0, 1)
+
+
+def _with_picture(texels: Texels, shown: Float[np.ndarray, "v 3"]) -> Mesh:
+    """The mesh of the texels with a texture of what they send out."""
+    # Where no texel is near the mean stands: coarser levels of the picture mix it in.
+    mean = jnp.asarray(shown.mean(axis=0))
+    picture = np.asarray(texels.image(jnp.asarray(shown), mean), np.float64)
+    codes = np.full((*texels.shape, 4), 255, np.uint8)
+    codes[..., :3] = np.rint(255 * srgb.encode(picture))
+    double_sided = any(material.double_sided for material in texels.mesh.materials)
+    return dataclasses.replace(
+        texels.mesh,
+        colors=None,
+        materials=(BaseColor("relit", texture=codes, double_sided=double_sided, unlit=True),),
+        face_material=jnp.zeros(len(texels.mesh.faces), np.int32),
+    )
 
 
 def _plain(mesh: Mesh, colors: Float[np.ndarray, "v 4"], suffix: str) -> Mesh:

@@ -13,7 +13,7 @@ from jaxtyping import ArrayLike, Float, Int
 
 from .._core.checks import as_path
 from .._core.files import check_place, put_in_place
-from ..geometry import Mesh
+from ..geometry import Mesh, Texels
 from ..imaging import Camera
 from ..transfer import Material, Transfer
 from ._lamp import Lamp
@@ -26,7 +26,7 @@ def export_html(
     path: str | os.PathLike[str],
     transfer: Transfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
-    faces: Int[ArrayLike, "f 3"] | Mesh,
+    faces: Int[ArrayLike, "f 3"] | Mesh | Texels,
     albedo: Float[ArrayLike, "..."] | Material | None = None,
     *,
     textured: bool | None = None,
@@ -53,17 +53,18 @@ def export_html(
     **Arguments**
 
     - `path`: of the file, which is replaced. Missing folders are made.
-    - `transfer`: of the V vertices of a mesh, as from `transfer.bake` or `unshadowed`; its
-      positions are the mesh's.
+    - `transfer`: of the V vertices of a mesh, as from `transfer.bake` or `unshadowed`, whose
+      positions are the mesh's; or of the V texels of a picture over one.
     - `light`: coefficients (3, K), or (n, 3, K) for several that a menu chooses from; of degree 10
       and the transfer's at most. What the transfer has beyond the light's degree is not written.
       None with a sky or a lamp alone, which are of the transfer's degree.
     - `faces`: (f, 3), the mesh's; or the `geometry.Mesh` itself, whose materials, textures and
-      vertex colors can then be shown.
-    - `albedo`: a number, RGB (3,), or per vertex (V, 1) or (V, 3); or a `transfer.Material` with
-      one specular albedo, a number or (3,), and one exponent, for `transfer.shade_glossy` towards
-      the camera; under a lamp the diffuse part alone is shown. By default the base color of a
-      mesh that has one, and 0.8 elsewhere.
+      vertex colors can then be shown; or the `geometry.Texels` that the transfer is of, which are
+      shaded one by one, and looked up at each pixel as by `imaging.sample_texture`.
+    - `albedo`: a number, RGB (3,), or per vertex or texel (V, 1) or (V, 3); or a
+      `transfer.Material` with one specular albedo, a number or (3,), and one exponent, for
+      `transfer.shade_glossy` towards the camera; under a lamp the diffuse part alone is shown. By
+      default the base color of a mesh that has one, and 0.8 elsewhere.
     - `textured`: whether the mesh's base color, at each pixel as by `imaging.base_color`,
       multiplies the diffuse albedo: by default where no albedo is given. Textures go as PNG.
     - `camera`: where the picture starts; by default `imaging.Camera.facing` the mesh. A window of
@@ -72,15 +73,16 @@ def export_html(
       `imaging.auto_exposure` of all vertices under the first light.
     - `names`: of the lights in the menu: those that are given, the sky, the lamp.
     - `title`: of the page.
-    - `values`: further numbers (V,) at the vertices by name, to be shown in false color. Floats run
-      through the colors from the least to the greatest. Integers of at most 8 kinds are levels with
-      a color each, laid over the picture: of an `adaptive.AdaptiveResult`,
+    - `values`: further numbers (V,) at vertices or texels by name, to be shown in false color.
+      Floats run through the colors from the least to the greatest. Integers of at most 8 kinds are
+      levels with a color each, laid over the picture: of an `adaptive.AdaptiveResult`,
       `shown_degree["specular"]` shows how far Lee & Kim's filter went at each vertex.
     - `sky`, `lamp`: further lights, which the page itself computes as they are moved.
 
     **Returns** the path. Runs on the host. Raises `ValueError` for shapes and degrees that do not
-    fit, for values that are not finite and for an albedo below 0, `TypeError` for objects of
-    another class, and `OSError` where the file cannot be written.
+    fit, for a mesh or texels that the transfer is not of, for values that are not finite and for an
+    albedo below 0, `TypeError` for objects of another class, and `OSError` where the file cannot
+    be written.
 
     **Example**
 

@@ -16,7 +16,7 @@ from .._core.checks import (
     check_number,
     check_type,
 )
-from ..geometry import Mesh
+from ..geometry import Mesh, Texels
 from ..imaging import Camera, auto_exposure
 from ..transfer import Material, Transfer
 from ._gloss import gloss_facts, split_material
@@ -53,7 +53,7 @@ class Codes(NamedTuple):
 def make_scene(
     transfer: Transfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
-    faces: Int[ArrayLike, "f 3"] | Mesh,
+    faces: Int[ArrayLike, "f 3"] | Mesh | Texels,
     albedo: Float[ArrayLike, "..."] | Material | None,
     *,
     textured: bool | None,
@@ -84,11 +84,10 @@ def make_scene(
     check_type("title", title, str)
     positions = np.asarray(transfer.positions, np.float32)
     check_finite("positions of the transfer", positions, wait=True)
-    middle, radius = _ball_around(positions, corners)
+    drawn = positions if surface.texels is None else surface.arrays["vertices"]
+    middle, radius = _ball_around(drawn, corners)
     if camera is None:
-        camera = Camera.facing(
-            Mesh(jnp.asarray(positions), jnp.asarray(corners), jnp.asarray(positions))
-        )
+        camera = Camera.facing(Mesh(jnp.asarray(drawn), jnp.asarray(corners), jnp.asarray(drawn)))
     check_type("camera", camera, Camera)
     rounded = quantized(np.asarray(transfer.vectors(lights.coefficients.shape[-1])))
     if exposure is None:

@@ -13,7 +13,7 @@ from ..transfer import Material, Transfer
 from ._gloss import split_material
 from ._lamp import Lamp
 from ._lights import shaded
-from ._surface import Surface
+from ._surface import Surface, looked_up
 
 
 class Still:
@@ -30,7 +30,9 @@ class Still:
         self.transfer, self.albedo, self.height, self.lamp = transfer, albedo, height, lamp
         faces = jnp.asarray(surface.faces)
         self.surface = surface
-        self.mesh = surface.mesh or Mesh(transfer.positions, faces, transfer.normals)
+        self.mesh = surface.mesh
+        if self.mesh is None:
+            self.mesh = Mesh(transfer.positions, faces, transfer.normals)
 
     def png(self, light: Float[np.ndarray, "3 k"], header: dict[str, Any]) -> bytes:
         """A PNG with the ground transparent, four samples in a pixel."""
@@ -44,13 +46,14 @@ class Still:
         raster = rasterize(self.mesh, camera, samples=2)
         first = header["kinds"][0], light
         sent = shaded(*first, self.transfer, self.albedo, camera.position, self.lamp)
-        seen = interpolate(raster, sent)
+        seen = looked_up(self.surface, raster, sent)
         if self.surface.tinted:
             diffuse, _ = split_material(self.albedo)
             white = shaded(*first, self.transfer, diffuse, camera.position, self.lamp)
-            color = base_color(self.mesh, raster).astype(white.dtype)
-            seen = interpolate(raster, sent - white) + interpolate(raster, white, color=color)
-        return _encoded(seen, raster.alpha, header["exposure"])
+            color = base_color(self.mesh, raster).astype(sent.dtype)
+            seen = seen + looked_up(self.surface, raster, white) * (color - 1)
+        mean = interpolate(raster, jnp.ones((len(self.mesh.vertices), 3), sent.dtype), color=seen)
+        return _encoded(mean, raster.alpha, header["exposure"])
 
 
 def _encoded(radiance: Float[Array, "h w 3"], alpha: Float[Array, "h w"], exposure: float) -> bytes:

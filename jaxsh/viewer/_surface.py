@@ -1,5 +1,6 @@
 """What a page draws: faces, vertices or texels that are shaded, and the base color over them."""
 
+import dataclasses
 import io
 import warnings
 from typing import Any, NamedTuple
@@ -9,8 +10,8 @@ from jaxtyping import Array, Float, UInt8
 
 from .._core import srgb
 from .._core.checks import as_host_integer, check_faces, check_flag, check_known, described
-from ..geometry import BaseColor, Mesh
-from ..imaging import base_color
+from ..geometry import BaseColor, Mesh, Texels
+from ..imaging import Raster, base_color, interpolate, sample_texture
 from ..transfer import Transfer
 
 # What browsers take along a side of a picture, phones too.
@@ -22,6 +23,7 @@ class Surface(NamedTuple):
     """Holds what is drawn, with facts for the header and arrays for the page."""
 
     mesh: Mesh | None  # None where faces alone were given
+    texels: Texels | None
     faces: np.ndarray  # (f, 3) int32, those of one material in a row
     tinted: bool  # whether its base color multiplies the diffuse light
     facts: dict[str, Any]
@@ -38,7 +40,8 @@ def make_surface(
     check_known("faces", given)
     if textured is not None:
         textured = check_flag("textured", textured)
-    mesh = given if isinstance(given, Mesh) else None
+    texels = given if isinstance(given, Texels) else None
+    mesh = texels.mesh if texels is not None else given if isinstance(given, Mesh) else None
     colored = mesh is not None and (mesh.colors is not None or bool(mesh.materials))
     if textured and not colored:
         raise ValueError(
@@ -48,24 +51,41 @@ def make_surface(
     tinted = colored and albedo is None if textured is None else textured
     if albedo is None:
         albedo = 1.0 if tinted else 0.8
+    _check_pair(transfer, given)
     if mesh is None:
         faces = _checked_faces(given, transfer.num_points)
-    else:
-        _check_pair(transfer, mesh)
-        faces = _checked_faces(mesh.faces, len(mesh.vertices))
-    if not tinted:
-        facts = _facts(_whole(faces))
-        return Surface(mesh, faces, False, facts, {}), albedo
-    assert mesh is not None
-    return _tinted(mesh, faces), albedo
+        return Surface(None, None, faces, False, _facts(_whole(faces)), {}), albedo
+    faces = _checked_faces(mesh.faces, len(mesh.vertices))
+    facts, arrays = _facts(_whole(faces)), {}
+    if tinted:
+        faces, facts, arrays = _tinted(mesh, faces)
+    if texels is not None:
+        height, width = texels.shape
+        facts["texels"] = {"width": width, "height": height}
+        arrays |= _of_texels(texels)
+    return Surface(mesh, texels, faces, tinted, facts, arrays), albedo
 
 
 def tinted(
     surface: Surface, sent: Float[Array, "v 3"], diffuse: Float[Array, "v 3"]
 ) -> Float[Array, "v 3"]:
-    """Multiply what is diffuse of what vertices send out by the mean base color around them."""
+    """Multiply what is diffuse of what points send out by the mean base color around."""
     assert surface.mesh is not None
-    return sent + diffuse * (base_color(surface.mesh).astype(sent.dtype) - 1)
+    own = base_color(surface.mesh).astype(sent.dtype)
+    if surface.texels is not None:
+        own = surface.texels.carry(own)
+    return sent + diffuse * (own - 1)
+
+
+def looked_up(
+    surface: Surface, raster: Raster, values: Float[Array, "v 3"]
+) -> Float[Array, "hn wn 3"]:
+    """Carry values at vertices or texels to the samples of a raster."""
+    if surface.texels is None:
+        one_by_one = dataclasses.replace(raster, samples=1)
+        return interpolate(one_by_one, values)
+    assert raster.uv is not None
+    return sample_texture(surface.texels.image(values), raster.uv, wrap="clamp")
 
 
 def _checked_faces(faces: Any, count: int) -> np.ndarray:
@@ -76,13 +96,32 @@ def _checked_faces(faces: Any, count: int) -> np.ndarray:
     return array.astype(np.int32)
 
 
-def _check_pair(transfer: Transfer, mesh: Mesh) -> None:
-    ours, theirs = np.asarray(transfer.positions), np.asarray(mesh.vertices)
-    if ours.shape != theirs.shape or not np.array_equal(ours, theirs.astype(ours.dtype)):
+def _check_pair(transfer: Transfer, given: Any) -> None:
+    if not transfer.cosine:
+        raise ValueError("expected transfer of a surface, got that of points without normals")
+    if isinstance(given, Mesh | Texels):
+        if not transfer.belongs_to(given):
+            known = isinstance(given, Texels)
+            other = f"{given.num_points} texels" if known else f"{len(given.vertices)} vertices"
+            raise ValueError(
+                f"expected the mesh or texels that the transfer's {transfer.num_points} "
+                f"{transfer.surface} are of, got {other} of other places or normals"
+            )
+    elif transfer.surface == "texels":
+        raise ValueError("expected geometry.Texels for a transfer of texels, got faces alone")
+
+
+def _of_texels(texels: Texels) -> dict[str, np.ndarray]:
+    if max(texels.shape) > _MOST_SIDE:
         raise ValueError(
-            f"expected the mesh whose {len(ours)} vertices the transfer is of, got one with "
-            f"{len(theirs)} {'others' if ours.shape == theirs.shape else 'vertices'}"
+            f"expected texels of a picture of at most {_MOST_SIDE} along a side, got "
+            f"{texels.shape[1]} × {texels.shape[0]}"
         )
+    return {
+        "vertices": np.asarray(texels.mesh.vertices).astype("<f4"),
+        "uv": np.nan_to_num(np.asarray(texels.mesh.uv)).astype("<f4"),
+        "source": np.asarray(texels.source).astype("<i4"),
+    }
 
 
 def _whole(faces: np.ndarray) -> list[dict[str, Any]]:
@@ -94,7 +133,9 @@ def _facts(groups: list[dict[str, Any]], **more: Any) -> dict[str, Any]:
     return plain | {"groups": groups} | more
 
 
-def _tinted(mesh: Mesh, faces: np.ndarray) -> Surface:
+def _tinted(
+    mesh: Mesh, faces: np.ndarray
+) -> tuple[np.ndarray, dict[str, Any], dict[str, np.ndarray]]:
     """Group faces by material, each with its factor and texture, and code the vertices' colors."""
     rows = np.full(len(faces), -1)
     if mesh.materials:
@@ -145,7 +186,7 @@ def _tinted(mesh: Mesh, faces: np.ndarray) -> Surface:
         arrays[f"texture{i}"] = np.frombuffer(_png(picture), np.uint8)
         textures.append({"array": f"texture{i}"})
     facts = _facts(groups, tinted=True, colored=mesh.colors is not None, textures=textures)
-    return Surface(mesh, faces[order], True, facts, arrays)
+    return faces[order], facts, arrays
 
 
 def _png(texture: UInt8[np.ndarray, "h w 4"]) -> bytes:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float, Int
 
 from .._core.checks import check_size
-from ..geometry import Mesh
+from ..geometry import Mesh, Texels
 from ..imaging import Camera
 from ..transfer import Material, Transfer
 from ._lamp import Lamp, checked_place
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def view(
     transfer: Transfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
-    faces: Int[ArrayLike, "f 3"] | Mesh,
+    faces: Int[ArrayLike, "f 3"] | Mesh | Texels,
     albedo: Float[ArrayLike, "..."] | Material | None = None,
     *,
     textured: bool | None = None,

@@ -1,5 +1,6 @@
 """Relit meshes, opened again by the rules of glTF and PLY with NumPy, by trimesh, by our reader."""
 
+import dataclasses
 import io
 import json
 import re
@@ -130,6 +131,39 @@ def test_textures_and_colors_stay_and_are_multiplied(tmp_path, rng):
     np.testing.assert_array_equal(glb.attribute("COLOR_0")[:, 3], colors[:, 3])
 
 
+def test_texels_become_a_texture_that_lies_where_they_do(tmp_path, rng):
+    u = jnp.asarray([[0.1, 0.1], [0.9, 0.1], [0.9, 0.6], [0.1, 0.6]], jnp.float32)
+    mesh = square(materials=(BaseColor("old", double_sided=True),), face_material=jnp.zeros(2, int))
+    texels = geometry.texels(dataclasses.replace(mesh, uv=u), (12, 10))
+    radiance = rng.uniform(0, 1.2, (texels.num_points, 3)).astype(np.float32)
+    path = imaging.write_relit(tmp_path / "t.glb", texels, radiance, exposure=0.9)
+    glb = Glb(path)
+    (material,) = glb.json["materials"]
+    assert material["extensions"] == {"KHR_materials_unlit": {}}
+    assert material["doubleSided"]
+    picture = glb.picture(0)
+    assert picture.shape == (10, 12, 3)
+    # glTF: (0, 0) is the upper left of the picture.
+    corners = glb.attribute("TEXCOORD_0")[
+        glb.array(glb.json["meshes"][0]["primitives"][0]["indices"])
+    ]
+    face, weights = np.asarray(texels.face), np.asarray(texels.barycentric)
+    place = np.einsum("nkc,nk->nc", corners.reshape(-1, 3, 2)[face], weights) * [12, 10]
+    column, row = np.floor(place).astype(int).T
+    expected = np.rint(screen(radiance, 0.9))
+    np.testing.assert_array_equal(picture[row, column], expected)
+    # Nothing dark beside the chart, which a smaller picture would mix in.
+    mean = np.clip(0.9 * radiance.astype(np.float64), 0, 1).mean(axis=0)
+    np.testing.assert_allclose(picture[0, 0], screen(mean, 1.0), rtol=0, atol=0.51)
+    (read,) = geometry.read_mesh(path).materials
+    np.testing.assert_array_equal(read.texture[..., :3], picture)
+    (part,) = trimesh.load(path, process=False).geometry.values()
+    np.testing.assert_array_equal(part.visual.material.baseColorTexture, picture)
+    for name, more in (("a.ply", {}), ("a.glb", {"textured": True})):
+        with pytest.raises(ValueError, match="expected a mesh as surface, got Texels"):
+            imaging.write_relit(tmp_path / name, texels, radiance, **more)
+
+
 def test_what_does_not_fit_is_refused_and_nothing_is_left(tmp_path, unchecked):
     mesh = square()
     for message, change in (
@@ -140,9 +174,9 @@ def test_what_does_not_fit_is_refused_and_nothing_is_left(tmp_path, unchecked):
         ("a .ply has no textures to leave", {"path": tmp_path / "a.ply", "textured": True}),
         ("expected a mesh with materials or colors", {"textured": True}),
     ):
-        given = {"path": tmp_path / "a.glb", "mesh": mesh, "radiance": RADIANCE} | change
+        given = {"path": tmp_path / "a.glb", "surface": mesh, "radiance": RADIANCE} | change
         with pytest.raises(ValueError, match=message):
-            imaging.write_relit(given.pop("path"), given.pop("mesh"), **given)
+            imaging.write_relit(given.pop("path"), given.pop("surface"), **given)
     assert list(tmp_path.iterdir()) == []
 
 

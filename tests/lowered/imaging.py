@@ -16,6 +16,7 @@ WITHOUT = {
     "read_splats": FILES,
     "write_image": FILES,
     "write_light": FILES,
+    "write_lightmap": FILES,
     "write_movie": FILES,
     "write_relit": FILES,
     "write_splats": FILES,

@@ -5,6 +5,7 @@ import numpy as np
 
 from jaxsh import geometry, imaging
 
+from .geometry import square_texels
 from .shared import eye, floats, knot, of
 
 
@@ -111,6 +112,15 @@ def calls():
             finite="light",
             slow=True,
         ),
+        "write_lightmap": of(
+            i.write_lightmap,
+            path="/dev/null/no/a.exr",
+            texels=square_texels(),
+            values=floats(6, 3),
+            exposure=1.0,
+            finite="values exposure",
+            slow=True,
+        ),
         "write_movie": of(
             i.write_movie,
             path="/dev/null/no/a.gif",
@@ -125,7 +135,7 @@ def calls():
         "write_relit": of(
             i.write_relit,
             path="/dev/null/no/a.glb",
-            mesh=mesh,
+            surface=mesh,
             radiance=floats(300, 3),
             exposure=1.0,
             textured=False,
