@@ -1,4 +1,4 @@
-"""What a page draws: faces, vertices or texels that are shaded, and the base color over them."""
+"""Surfaces for a page: faces, what of them is shaded, and the base color over them."""
 
 import dataclasses
 import io

@@ -13,6 +13,7 @@ def calls():
         "light": floats(3, K),
         "faces": np.array([[0, 1, 2], [3, 4, 5]]),
         "albedo": floats(3),
+        "textured": None,
         "camera": imaging.Camera(eye(), np.zeros(3), width=6, height=8),
         "exposure": 1.0,
         "names": ["studio"],
