@@ -14,7 +14,8 @@ from .._core.files import check_place, put_in_place
 from .._core.npy import from_npz, text_of
 from .._core.words import reason
 from ..harmonics import degree_of
-from ._transfer import SurfaceKind, Transfer
+from ._surfaces import SurfaceKind
+from ._transfer import Transfer
 
 # Version 1 holds vertices with the cosine, and is what those are written as; 2 holds any points.
 _FORMAT, _VERSIONS = "jaxsh transfer", (1, 2)

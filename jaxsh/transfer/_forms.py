@@ -14,7 +14,8 @@ from .._core.linalg import matmul
 from .._core.xla import materialize, on_mesh
 from ..harmonics import degree_of, num_coefficients
 from ._glossy_kernels import block_sums, in_steps, mirrored, node_passes, rows_of
-from ._transfer import AbstractTransfer, SurfaceKind, Transfer, checked_degree, irradiances
+from ._surfaces import SurfaceKind
+from ._transfer import AbstractTransfer, Transfer, checked_degree, irradiances
 
 # Vertices side by side: a block's coefficients stay in the first cache.
 _BLOCK = 128

@@ -51,10 +51,15 @@ class BlockStore:
     def dtype(self) -> np.dtype:
         return self._array("coefficients").dtype
 
-    def rows(self, block: int) -> slice:
-        """Tell which vertices a block holds."""
-        start = block * self.block_rows
-        return slice(start, min(start + self.block_rows, self.num_points))
+    def rows(self, block: int, name: str = "coefficients") -> slice:
+        """Tell which rows of an array a block holds."""
+        array = self._array(name)
+        start = block * array.chunks[0]
+        return slice(start, min(start + array.chunks[0], array.shape[0]))
+
+    def blocks(self, name: str) -> int:
+        """Count the blocks of an array."""
+        return _blocks(self._array(name))
 
     def missing(self, name: str = "coefficients", *, check: bool = False) -> list[int]:
         """List the blocks of an array that are not there in full.
@@ -148,15 +153,19 @@ class BlockStore:
         if changed:
             self._record(changed, {})
 
-    def add(self, later: dict[str, tuple[tuple[int, ...], np.dtype]]) -> None:
+    def add(
+        self, later: dict[str, tuple[tuple[int, ...], np.dtype]], apart: dict[str, int]
+    ) -> None:
         """Make room for those arrays, of shapes and dtypes, that are not there.
 
-        Raises `ValueError` where one is of another shape or dtype.
+        Those `apart` have blocks of as many rows as it says. Raises `ValueError` where one is of
+        another shape or dtype.
         """
         with written(self.path):
             for name, (shape, dtype) in later.items():
                 if name not in self._group:
-                    make_array(self._group, name, shape, dtype, self.block_rows)
+                    rows = apart.get(name, self.block_rows)
+                    make_array(self._group, name, shape, dtype, rows)
         for name, expected in later.items():
             array = self._array(name)
             if (array.shape, array.dtype) != expected:

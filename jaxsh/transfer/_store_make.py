@@ -33,10 +33,12 @@ def make(
     later: dict[str, tuple[tuple[int, ...], np.dtype]],
     rows: int,
     attributes: dict[str, Any],
+    apart: dict[str, int],
 ) -> bool:
     """Write a store, which is put in its place complete, unless another process was faster.
 
-    Of the arrays `later` only shapes and dtypes are known yet. Returns whether this is the store
+    Of the arrays `later` only shapes and dtypes are known yet. All are in blocks of `rows`, but
+    those `apart`, for which it says how many. Returns whether this is the store
     that is there now. Raises `OSError` where it cannot be written.
     """
     import zarr
@@ -49,9 +51,9 @@ def make(
     try:
         group = zarr.create_group(temporary, overwrite=True)
         for name, array in arrays.items():
-            make_array(group, name, array.shape, array.dtype, rows)
+            make_array(group, name, array.shape, array.dtype, apart.get(name, rows))
         for name, (shape, dtype) in later.items():
-            make_array(group, name, shape, dtype, rows)
+            make_array(group, name, shape, dtype, apart.get(name, rows))
         version = VERSIONS["surface" in attributes]
         group.attrs.update({"format": FORMAT, "version": version} | attributes)
         store = BlockStore(temporary)

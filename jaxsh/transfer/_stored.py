@@ -16,7 +16,8 @@ from .._core.devices import Devices, last_of, mesh_of, own_numbers, place
 from ..harmonics import degree_of
 from ._store import BlockStore
 from ._store_stream import stream
-from ._transfer import SurfaceKind, Transfer
+from ._surfaces import SurfaceKind
+from ._transfer import Transfer
 
 _ARRAYS = "coefficients", "positions", "normals", "neighbors"
 _USUAL = {"surface": "vertices", "cosine": True}  # of a store that does not say

@@ -2,7 +2,7 @@
 
 import abc
 import dataclasses
-from typing import Literal, get_args
+from typing import get_args
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -22,12 +22,10 @@ from .._core.checks import (
 )
 from .._core.devices import Devices, last_of, mesh_of, own_numbers, share
 from .._core.linalg import shading_matmul, shading_tall_product
+from ..geometry import Mesh, Points, Surface, Texels
 from ..harmonics import degree_of, num_coefficients
 from ._glossy_kernels import AtNodes, node_passes, reflected
-from ._surfaces import Surface, points_and_normals
-
-# What the rows of a transfer are: vertices of a mesh, points, or texels of an atlas.
-SurfaceKind = Literal["vertices", "points", "texels"]
+from ._surfaces import SurfaceKind, points_and_normals
 
 
 class AbstractTransfer(eqx.Module):
@@ -186,9 +184,9 @@ class Transfer(AbstractTransfer):
 
         Compares positions and normals, rounded to the transfer's dtype; of those that are traced or
         held by other processes the number alone. What `sharded` has filled up is passed over.
-        Raises `TypeError` for what is no surface.
+        Raises `TypeError` for what is no `Mesh`, `Points` or `Texels`.
         """
-        check_type("surface", surface, *(get_args(Surface) or (Surface,)))
+        check_type("surface", surface, Mesh, Points, Texels)
         points, normals = points_and_normals(surface)
         count = len(points)
         if (normals is not None) != self.cosine or not 0 < count <= self.num_points:

@@ -236,12 +236,15 @@ def test_bounces_off_another_mesh_than_the_scenes_first_are_refused():
         ({"ray_bias": float("nan")}, "ray_bias must be a number > 0, got nan"),
         ({"albedo": np.ones(3)}, r"albedo must be a number or have shape \(8,\), got shape \(3,\)"),
         ({"albedo": -0.1}, "albedo must be finite and >= 0"),
-        ({"mesh": "ball.ply"}, "expected mesh as a Mesh, got .ball.ply."),
+        (
+            {"surface": "ball.ply"},
+            "expected surface as a Mesh or a Points or a Texels, got .ball.ply.",
+        ),
     ],
 )
 def test_bad_arguments_are_refused(unchecked, options, message):
     with pytest.raises((ValueError, TypeError), match=message):
-        bake(**({"mesh": bodies.cube(), "degree": 2, "progress": False} | options))
+        bake(**({"surface": bodies.cube(), "degree": 2, "progress": False} | options))
 
 
 def test_bad_meshes_are_refused(unchecked):

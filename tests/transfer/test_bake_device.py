@@ -13,7 +13,7 @@ from jaxsh.geometry import JaxRayScene, Mesh, _cast, knot, ray_scene, vertex_nor
 from jaxsh.transfer import bake
 from jaxsh.transfer._bake import _chunk, _device, _passes
 from jaxsh.transfer._bake._directions import guided, turned_fibonacci
-from jaxsh.transfer._bake._receivers import surface
+from jaxsh.transfer._bake._receivers import faces_of
 
 MESH = knot(500)
 OPTIONS = {"directions": 64, "progress": False}  # 128 vertices in a chunk
@@ -167,7 +167,7 @@ def traced(name):
         program = functools.partial(_chunk.shadowed_rows.trace, degree=6)
     else:
         outgoing = jnp.zeros((len(MESH.vertices), 49), dtype)
-        given = _chunk.reflectors(turned_fibonacci(256, 0, dtype), surface(MESH), outgoing)
+        given = _chunk.reflectors(turned_fibonacci(256, 0, dtype), faces_of(MESH), outgoing)
         program = _chunk.bounced_rows.trace
     return program(scene.tree, vectors, vectors, given, lanes=2**19)
 

@@ -15,7 +15,7 @@ def calls():
     light, flags = floats(3, K), {"distant": True, "normalized": True}
     suns = sphere.Suns(floats(2, 3), floats(2), floats(2, 3))
     rays = {
-        "mesh": knot(),
+        "surface": knot(),
         "degree": 1,
         "directions": 16,
         "shadows": True,
@@ -69,6 +69,7 @@ def calls():
             client="tcp://nowhere",
             **rays,
             store="/dev/null/no/knot",
+            scene=None,
             device=False,
             free="client store",
         ),

@@ -1,9 +1,7 @@
-"""Baking transfer: rays for every vertex, projected."""
+"""Baking transfer: rays for every vertex, point or texel, projected."""
 
-import functools
 import os
 import warnings
-from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -11,22 +9,22 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from ... import geometry
 from ..._core.checks import as_path
-from ...geometry import Mesh, RayScene
+from ...geometry import Mesh, RayScene, Surface
+from .._surfaces import points_and_normals
 from .._transfer import Transfer
 from ._blind import why_blind
-from ._device import DeviceJob, job_of, scene_for
+from ._device import DeviceJob, jobs_of, scene_for
 from ._faults import check_first, checked, faults
-from ._job import Prepared
-from ._kept import BakeStore, refuse
+from ._job import DIRECT, BakeArguments, Prepared
+from ._kept import BakeStore, neighbors_of, refuse
 from ._origins import origins
 from ._passes import Passes, progress_bar
-from ._receivers import unit_normals
+from ._receivers import unit_normals, units_of
 
 
 def bake(
-    mesh: Mesh,
+    surface: Surface,
     degree: int,
     *,
     directions: int = 2048,
@@ -35,16 +33,16 @@ def bake(
     albedo: Float[ArrayLike, "*v"] = 0.5,
     ray_bias: float | None = None,
     offset: float | None = None,
-    scene: RayScene | None = None,
+    scene: RayScene | Mesh | None = None,
     device: bool | None = None,
     seed: int = 0,
     chunk: int = 256,
     store: str | os.PathLike[str] | None = None,
     progress: bool = True,
 ) -> Transfer:
-    """Bake the transfer of a mesh: for each vertex ∫ V(ω) max(0, n·ω) y_i(ω) dω, by rays.
+    """Bake the transfer of a surface: at each point ∫ V(ω) max(0, n·ω) y_i(ω) dω, by rays.
 
-    Sloan, Kautz & Snyder 2002, "Precomputed radiance transfer". All vertices share one even set
+    Sloan, Kautz & Snyder 2002, "Precomputed radiance transfer". All points share one even set
     of directions, turned at random by `seed`. Rays are spent where they matter most:
 
     - The blocked part is measured and subtracted from the cosine's exact coefficients. Where
@@ -55,6 +53,9 @@ def bake(
 
     **Arguments**
 
+    - `surface`: a `Mesh`, whose vertices are the points; `geometry.Texels`; or `geometry.Points`,
+      of which those without normals are of a volume, with visibility alone: ∫ V(ω) y_i(ω) dω over
+      the whole sphere, for `fluence`.
     - `degree`: the largest l; K = (degree+1)² coefficients.
     - `directions`: rays granted, over the whole sphere. About half as many leave a vertex, more
       where shadows are intricate, fewer where there are none. The coefficients' relative RMS error
@@ -62,8 +63,10 @@ def bake(
       statue with fine folds (experiment `sloan2002.first_light`).
     - `shadows`: `False` leaves out visibility, and all rays.
     - `bounces`: how often light may be reflected diffusely on its way. Each casts the half
-      of an even set of `directions` that leaves a vertex, again from every vertex.
-    - `albedo`: of the bounces only, a number or one per vertex (V,). Backs of faces reflect
+      of an even set of `directions` that leaves a vertex, again from every vertex. Light bounces
+      off the vertices of a mesh: the surface itself, that of the texels, or the `scene`, whose own
+      transfer is then baked first, with one bounce less, and gathered at the points.
+    - `albedo`: of the bounces only, a number or one per vertex of that mesh. Backs of faces reflect
       nothing, and neither do further meshes of a `scene`.
     - `ray_bias`: where rays start along the normal, as a share of half the mesh's longest extent
       along an axis, the same at each vertex. By default 1e-5 of it, and at most 1/1000 of the
@@ -71,31 +74,37 @@ def bake(
       times what coordinates are rounded to: a surface nearer than that casts no shadow. Larger
       ones lose fine shadows; one `UserWarning` says where they pass 1/10 of the shortest edge.
     - `offset`: the same as a distance in the unit of the vertices, in place of `ray_bias`.
-    - `scene`: the surfaces that stop rays, where these are not the mesh alone: any
-      `geometry.RayScene`. For bounces the mesh must be the first in it. By default
+    - `scene`: the surfaces that stop rays, in place of the mesh, or that of the texels, alone:
+      another `Mesh`, or any `geometry.RayScene`. For bounces the mesh must be the first in the
+      latter. `Points` stop no rays, and need one of the two; for bounces a `Mesh`. By default
       `geometry.ray_scene(mesh)`, which casts by JAX where Embree is not installed.
     - `device`: `True` casts the rays on JAX's default device, in one program for each of a few
       chunks of vertices, and the coefficients stay there; a `scene` must then be a
       `geometry.JaxRayScene`, on whose device it is done. `False` casts them on the host. By default
       they are cast on a GPU or TPU where that is the default device and `scene` allows it. The two
       differ where rays graze an edge, by far less than two seeds do (experiment `devices.bake`).
-    - `chunk`: vertices in a block, rounded up to a multiple of 64. Each core works on one block. On
+    - `chunk`: points in a block, rounded up to a multiple of 64. Each core works on one block. On
       a device its size and `directions` decide.
     - `store`: a folder, made here, that keeps the blocks finished so far and in the end the whole
       transfer, for any reader of Zarr 3. A bake that was stopped goes on from it when called again
       with the same arguments, and blocks that are damaged are baked again. It does not record
-      `scene`: pass the same one when you resume.
+      a scene of rays: pass the same one when you resume.
     - `progress`: shows a bar when standard error is a terminal and the bake takes over a second.
 
-    **Returns** a `Transfer` of the dtype of the mesh's vertices. On one machine a seed gives the
-    same bits whatever the chunk, the number of threads and the interruptions.
+    **Returns** a `Transfer` of the dtype of the positions, which says what its points are
+    (`surface`, `cosine`, `belongs_to`); points and texels have no neighbors. On one machine a seed
+    gives the same bits whatever the chunk, the number of threads and the interruptions.
+
+    The face under a texel stops rays of its own that lie above the normal's horizon and below the
+    face's: where normals are far from their faces', as on coarse meshes, light from the side is
+    lost between the vertices. Points a little inside the mesh see nothing: give an `offset`.
 
     Meshes may have any size and lie anywhere. What float32 rounds coordinates to is lost: give
     those of a map less their middle, or in float64.
 
     The direct light's coefficients are zero where the normal is undefined (it is zero, NaN or
     infinite, or the vertex's faces cancel) and where all rays are blocked, as they are inside the
-    mesh; one `UserWarning` counts these vertices and says why. Surfaces that coincide are in front
+    mesh; one `UserWarning` counts these points and says why. Surfaces that coincide are in front
     of each other by chance: leave a gap. Of rays that graze a surface within rounding a few hit
     what they miss, by Embree more than by `geometry.JaxRayScene`.
 
@@ -110,10 +119,14 @@ def bake(
     >>> baked = transfer.bake(geometry.knot(300), degree=2, directions=64)
     >>> baked.coefficients.shape, baked.degree
     ((300, 9), 2)
+    >>> space = geometry.Points(baked.positions + 2)
+    >>> around = transfer.bake(space, degree=2, directions=64, scene=geometry.knot(300))
+    >>> around.surface, around.cosine
+    ('points', False)
     """
     path = None if store is None else as_path(store, "store").absolute()
-    arguments = checked(
-        mesh,
+    arguments, mesh, cast = checked(
+        surface,
         degree,
         directions=directions,
         shadows=shadows,
@@ -126,55 +139,80 @@ def bake(
         scene=scene,
         device=device,
     )
-    identity = {} if path is None else arguments.identity(mesh)
+    identity = {} if path is None else arguments.identity(surface)
     if path is not None:
         refuse(path, identity)
-    normals = unit_normals(mesh)
-    caster, start, positions = None, None, np.asarray(mesh.vertices)
+    normals = units_of(surface)
+    caster, start, reflector = None, None, None
+    positions = np.asarray(points_and_normals(surface)[0])
     if shadows:
-        caster = scene_for(mesh, arguments.device) if scene is None else scene
-        start = origins(mesh, normals, caster, ray_bias, offset)
+        caster = scene_for(mesh, arguments.device) if cast is None else cast
+        start = origins(surface, normals, caster, ray_bias, offset, mesh=mesh)
         positions = start.positions
-        if scene is not None and arguments.bounces:
-            check_first(mesh, scene, normals, start)
+        if arguments.bounces:
+            assert mesh is not None
+            known, off = normals, start
+            if arguments.apart:
+                known = unit_normals(mesh)
+                off = origins(mesh, known, caster, ray_bias, offset)
+                reflector = Prepared(known, off.positions)
+            if cast is not None:
+                check_first(mesh, cast, known, off)
 
     def why(blind: Int[np.ndarray, " n"]) -> list[str]:
         if caster is None or start is None:
             return []
-        return why_blind(mesh, caster, blind, normals, start)
+        return why_blind(surface, mesh, caster, blind, normals, start)
 
     prepared = Prepared(normals, positions)
-    job = job_of(mesh, arguments, caster, prepared)
-    kept = None if path is None else BakeStore.of(path, mesh, arguments, prepared, identity)
-    with progress_bar(arguments.passes * len(normals), progress) as bar:
-        passes = Passes(job, chunk, kept, bar)
-        run: Callable[..., Any] = passes.run
-        if kept is None and isinstance(job, DeviceJob):
-            run = functools.partial(job.whole, bar)
+    jobs = jobs_of(mesh, arguments, caster, prepared, reflector)
+    kept = None
+    if path is not None:
+        kept = BakeStore.of(path, surface, mesh, arguments, prepared, reflector, identity)
+    steps = jobs.steps
+    with progress_bar(sum(jobs.of(n).num_points for n in range(len(steps))), progress) as bar:
+        passes = Passes(jobs, chunk, kept, bar)
+
+        def run(number: int, before: Any = None, direct: Any = None) -> Any:
+            job = jobs.of(number)
+            if kept is None and isinstance(job, DeviceJob):
+                return job.whole(bar, steps[number].before is not None, before, direct)
+            return passes.run(number, before, direct)
+
         if kept is not None and kept.finished:
             said = kept.attributes["warning"]
-            coefficients = run(arguments.passes - 1)
+            coefficients = run(len(steps) - 1)
         else:
-            coefficients = direct = run(0)
-            blind = ~np.asarray(direct.any(axis=1)) & normals.any(axis=1)
-            said = faults(mesh, normals, np.flatnonzero(blind), why)
-            for bounce in range(1, arguments.passes):
-                coefficients = run(bounce, coefficients, direct)
+            said, done = "", dict[int | None, Any]()
+            for number, step in enumerate(steps):
+                done[number] = run(number, done.get(step.before), done.get(step.direct))
+                if step == DIRECT:
+                    blind = ~np.asarray(done[number].any(axis=1)) & normals.any(axis=1)
+                    said = faults(surface, normals, np.flatnonzero(blind), why)
+                wanted = {n for later in steps[number + 1 :] for n in (later.before, later.direct)}
+                done = {n: rows for n, rows in done.items() if n in wanted or n == number}
+            coefficients = done[len(steps) - 1]
             if kept is not None:
                 kept.finish(said)
     if said:
         warnings.warn(said, UserWarning, stacklevel=2)
-    return _transfer(mesh, coefficients, kept)
+    return _transfer(surface, arguments, coefficients, kept)
 
 
 def _transfer(
-    mesh: Mesh, coefficients: Float[np.ndarray | Array, "v k"], kept: BakeStore | None
+    surface: Surface,
+    arguments: BakeArguments,
+    coefficients: Float[np.ndarray | Array, "v k"],
+    kept: BakeStore | None,
 ) -> Transfer:
-    # Where JAX computes in single precision its arrays are single, as those of the mesh become.
+    # Where JAX computes in single precision its arrays are single, as those of the surface become.
     dtype = jax.dtypes.canonicalize_dtype(coefficients.dtype)
+    positions, normals = points_and_normals(surface)
     return Transfer(
         coefficients=jax.device_put(coefficients.astype(dtype, copy=False)),
-        positions=jnp.asarray(mesh.vertices),
-        normals=jnp.asarray(mesh.normals),
-        neighbors=geometry.neighbors(mesh) if kept is None else kept.whole("neighbors"),
+        positions=jnp.asarray(positions),
+        normals=jnp.zeros_like(positions) if normals is None else jnp.asarray(normals),
+        neighbors=neighbors_of(surface) if kept is None else kept.whole("neighbors"),
+        surface=arguments.surface,
+        cosine=arguments.cosine,
     )

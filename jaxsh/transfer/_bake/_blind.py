@@ -5,23 +5,27 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt64
 
-from ...geometry import Mesh, RayScene
+from ...geometry import Mesh, RayScene, Surface
 from ._origins import Origins
 from ._receivers import areas_of, unit_size
 
 # Rays from each vertex, and vertices that are asked: as many as cost a small part of a bake.
 _RAYS, _MOST = 6, 4096
 _TWINS = "on faces that are there twice, both ways round"
+_ZERO = "whose normal is zero, NaN or infinite"
 _MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
 
-def why_undefined(mesh: Mesh, undefined: Bool[np.ndarray, " v"]) -> list[str]:
-    """Say in a phrase each why these vertices have no normal, the commonest cause first."""
-    given = np.asarray(mesh.normals)[undefined]
+def why_undefined(surface: Surface, undefined: Bool[np.ndarray, " v"]) -> list[str]:
+    """Say in a phrase each why these points have no normal, the commonest cause first."""
+    given = np.asarray(surface.normals)[undefined]
     none = ~np.isfinite(given).all(axis=1) | ~given.any(axis=1)
+    if not isinstance(surface, Mesh):
+        return _phrases({_ZERO: none}, 1.0)
+    mesh = surface
     return _phrases(
         {
-            "whose normal is zero, NaN or infinite": none,
+            _ZERO: none,
             _TWINS: _on_twins(mesh, np.flatnonzero(undefined)),
             "on faces that cancel": ~none,
         },
@@ -30,16 +34,19 @@ def why_undefined(mesh: Mesh, undefined: Bool[np.ndarray, " v"]) -> list[str]:
 
 
 def why_blind(
-    mesh: Mesh,
+    surface: Surface,
+    mesh: Mesh | None,
     scene: RayScene,
     blind: Int[np.ndarray, " n"],
     normals: Float[np.ndarray, "v 3"],
     start: Origins,
 ) -> list[str]:
-    """Say in a phrase each why these vertices see nothing, the commonest cause first."""
+    """Say in a phrase each why these points see nothing, the commonest cause first.
+
+    `mesh` is the one in their way, where that is known.
+    """
     whole, blind = len(blind), blind[:: -(-len(blind) // _MOST)]
     normals, origins, distance = normals[blind], start.positions[blind], start.distance[blind]
-    seen = _seen(mesh, scene, blind, normals, origins)
     # Whether something lies between where the rays start and where they might at the nearest.
     ahead = distance - start.least[blind]
     crossed = np.zeros(len(blind), bool)
@@ -47,17 +54,31 @@ def why_blind(
     if far.any():
         nearest = (origins - ahead[:, None] * normals)[far]
         crossed[far] = scene.occluded(nearest, normals[far], ahead[far])
-    causes = {
+    beyond = {
         f"with rays that start beyond the next surface, up to {distance.max():.2g} off: give a "
-        "smaller ray_bias or offset": crossed,
-        _TWINS: _on_twins(mesh, blind),
-        "with normals that point against their faces": _against(mesh, blind, normals),
-        "shut in by other meshes of the scene": seen.foreign,
-        "on a closed piece whose faces point inwards": seen.inverted & ~seen.behind,
-        "behind faces of another piece, as inside it": seen.behind & seen.beyond,
-        "behind faces of their own piece, which folds or cuts through itself": seen.behind,
-        "shut in by the fronts of faces, as in a cavity": np.ones(len(blind), bool),
+        "smaller ray_bias or offset": crossed
     }
+    every = np.ones(len(blind), bool)
+    if isinstance(surface, Mesh):
+        seen = _seen(surface, scene, blind, normals, origins)
+        causes = beyond | {
+            _TWINS: _on_twins(surface, blind),
+            "with normals that point against their faces": _against(surface, blind, normals),
+            "shut in by other meshes of the scene": seen.foreign,
+            "on a closed piece whose faces point inwards": seen.inverted & ~seen.behind,
+            "behind faces of another piece, as inside it": seen.behind & seen.beyond,
+            "behind faces of their own piece, which folds or cuts through itself": seen.behind,
+            "shut in by the fronts of faces, as in a cavity": every,
+        }
+    elif mesh is None:
+        causes = beyond | {"shut in by the scene": every}
+    else:
+        met = _met(mesh, scene, normals, origins)
+        back = 2 * _count(met.ray[met.back], every) > _count(met.ray, every)
+        causes = beyond | {
+            "behind faces, as inside the mesh": back,
+            "shut in by the fronts of faces, as in a cavity": every,
+        }
     return _phrases(causes, whole / len(blind))
 
 
@@ -80,8 +101,18 @@ class _Seen(NamedTuple):
     inverted: Bool[np.ndarray, " n"]  # it is closed and encloses a negative volume
 
 
-def _seen(mesh: Mesh, scene: RayScene, blind, normals, origins) -> _Seen:
-    points, faces, count = np.asarray(mesh.vertices), np.asarray(mesh.faces), len(blind)
+class _Met(NamedTuple):
+    """Holds what rays met of a mesh: for each of m of them, `_RAYS` from a point."""
+
+    all: Int[np.ndarray, " n"]  # how many of a point's rays met anything
+    ray: Int[np.ndarray, " m"]  # of which point
+    face: Int[np.ndarray, " m"]
+    back: Bool[np.ndarray, " m"]  # met it from behind
+
+
+def _met(mesh: Mesh, scene: RayScene, normals, origins) -> _Met:
+    """Cast a few rays from each point into its half of space."""
+    points, faces, count = np.asarray(mesh.vertices), np.asarray(mesh.faces), len(normals)
     directions = np.random.default_rng(0).normal(size=(count, _RAYS, 3))
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
     directions = (directions + 1.01 * normals[:, None]).reshape(-1, 3)
@@ -95,19 +126,29 @@ def _seen(mesh: Mesh, scene: RayScene, blind, normals, origins) -> _Seen:
     there = np.einsum("nij,ni->nj", corners, hit.barycentric[ours].astype(np.float64))
     agree = np.linalg.norm(there - place, axis=1) <= 1e-3 * np.ptp(points, axis=0).max()
     ours = ours[agree]
-    ray = ours // _RAYS
+    face = hit.face[ours]
+    back = np.einsum("in,ni->n", areas_of(points, faces[face]), directions[ours]) > 0
+    met = np.bincount(np.flatnonzero(hit.mesh >= 0) // _RAYS, minlength=count)
+    return _Met(met, ours // _RAYS, face, back)
 
-    def number(rays: np.ndarray) -> np.ndarray:
-        return np.bincount(rays, minlength=count)
 
-    back = np.einsum("in,ni->n", areas_of(points, faces[hit.face[ours]]), directions[ours]) > 0
+def _count(rays: Int[np.ndarray, " n"], points: np.ndarray) -> Int[np.ndarray, " p"]:
+    return np.bincount(rays, minlength=len(points))
+
+
+def _seen(mesh: Mesh, scene: RayScene, blind, normals, origins) -> _Seen:
+    faces, count = np.asarray(mesh.faces), len(blind)
+    met = _met(mesh, scene, normals, origins)
+    ray, back = met.ray, met.back
     piece = _pieces(mesh)
-    other = back & (piece[faces[hit.face[ours], 0]] != piece[blind[ray]])
-    met = number(np.flatnonzero(hit.mesh >= 0) // _RAYS)
-    behind = 2 * number(ray[back]) > number(ray)
+    other = back & (piece[faces[met.face, 0]] != piece[blind[ray]])
+    behind = 2 * _count(ray[back], blind) > _count(ray, blind)
     inverted = np.zeros(count, bool) if behind.all() else _inverted(mesh, piece)[piece[blind]]
     return _Seen(
-        2 * number(ray) < met, behind, 2 * number(ray[other]) > number(ray[back]), inverted
+        2 * _count(ray, blind) < met.all,
+        behind,
+        2 * _count(ray[other], blind) > _count(ray[back], blind),
+        inverted,
     )
 
 

@@ -13,9 +13,9 @@ from jaxtyping import Array, Float, Int
 from ..._core.linalg import matmul
 from ...geometry import RayTree
 from ...geometry._pairs import cast_pairs, met_along
-from ...harmonics import clamped_cosine, convolve, evaluate
+from ...harmonics import clamped_cosine, convolve, evaluate, num_coefficients
 from ._directions import Directions
-from ._receivers import Surface
+from ._receivers import Faces
 
 # Numbers that a bounce looks up at once at the ends of its rays, for each lane.
 _LOOKED_UP = 128
@@ -56,7 +56,7 @@ def lights(directions: Directions) -> Lights:
 
 
 def reflectors(
-    vectors: Float[np.ndarray, "d 3"], surface: Surface, outgoing: Float[Array, "v k"]
+    vectors: Float[np.ndarray, "d 3"], surface: Faces, outgoing: Float[Array, "v k"]
 ) -> Reflectors:
     """Put what a bounce needs on the default device; only signs are asked of `outward`."""
     _, exponent = np.frexp(np.abs(surface.outward).max(axis=1, keepdims=True, initial=0))
@@ -69,7 +69,7 @@ def reflectors(
     )
 
 
-@functools.partial(jax.jit, static_argnames=("degree", "lanes"))
+@functools.partial(jax.jit, static_argnames=("degree", "lanes", "cosine"))
 def shadowed_rows(
     tree: RayTree,
     origins: Float[Array, "m 3"],
@@ -78,13 +78,14 @@ def shadowed_rows(
     *,
     degree: int,
     lanes: int,
+    cosine: bool = True,
 ) -> Float[Array, "m k"]:
     """Compute what `shadowed` does, in one program: cosines, two casts of rays and a product.
 
     `origins` are float32, in the tree's frame. All rays of the guides are cast first, and then
     those of the other directions whose guide does not speak for them.
     """
-    cosines = matmul(normals, lights.vectors.T)
+    cosines = _cosines(normals, lights.vectors, cosine)
     above = cosines > 0
     cast = functools.partial(cast_pairs, tree, origins, first=False, lanes=lanes)
     guides = lights.around.shape[1]
@@ -99,13 +100,13 @@ def shadowed_rows(
         asked = rest & doubtful[:, lights.nearest]
         told = rest & ~asked & answer[:, lights.nearest]
         blocked = jnp.concatenate([answer, told | (cast(lights.rays[guides:], asked) >= 0)], axis=1)
-    exact = _unshadowed(normals, degree)
+    exact = _unshadowed(normals, degree, cosine)
     coefficients = exact - matmul(jnp.where(blocked, cosines, 0), lights.basis)
     dark = jnp.any(above, axis=1) & jnp.all(above == blocked, axis=1)
     return jnp.where(dark[:, None], 0, coefficients)
 
 
-@functools.partial(jax.jit, static_argnames="lanes")
+@functools.partial(jax.jit, static_argnames=("lanes", "cosine"))
 def bounced_rows(
     tree: RayTree,
     origins: Float[Array, "m 3"],
@@ -113,9 +114,10 @@ def bounced_rows(
     reflectors: Reflectors,
     *,
     lanes: int,
+    cosine: bool = True,
 ) -> Float[Array, "m k"]:
     """Compute what `bounced` does, in one program."""
-    cosines = matmul(normals, reflectors.vectors.T)
+    cosines = _cosines(normals, reflectors.vectors, cosine)
     rays = reflectors.rays
     leaf = cast_pairs(tree, origins, rays, cosines > 0, first=True, lanes=lanes)
     faces, outward, outgoing = reflectors.faces, reflectors.outward, reflectors.outgoing
@@ -138,9 +140,26 @@ def bounced_rows(
     return lax.map(gathered, (origins, cosines, leaf), batch_size=together)
 
 
-def _unshadowed(normals: Float[Array, "m 3"], degree: int) -> Float[Array, "m k"]:
-    """Expand the clamped cosine about each normal, zero about a zero normal."""
+def _cosines(
+    normals: Float[Array, "m 3"], vectors: Float[Array, "d 3"], cosine: bool
+) -> Float[Array, "m d"]:
+    """Compute by what light along each direction counts: without cosine 1, but for zero normals.
+
+    Those fill the last chunk up, and cast no ray.
+    """
+    if cosine:
+        return matmul(normals, vectors.T)
+    defined = jnp.any(normals != 0, axis=1, keepdims=True).astype(normals.dtype)
+    return jnp.broadcast_to(defined, (len(normals), len(vectors)))
+
+
+def _unshadowed(normals: Float[Array, "m 3"], degree: int, cosine: bool) -> Float[Array, "m k"]:
+    """Expand the clamped cosine about each normal, zero about a zero normal; or the sphere."""
     defined = jnp.any(normals != 0, axis=1, keepdims=True)
+    if not cosine:
+        whole = np.zeros((1, num_coefficients(degree)))
+        whole[0, 0] = math.sqrt(4 * math.pi)
+        return jnp.where(defined, jnp.asarray(whole, normals.dtype), 0)
     up = jnp.asarray([0, 0, 1], normals.dtype)[None]
     exact = convolve(evaluate(jnp.where(defined, normals, up), degree), clamped_cosine(degree))
     return jnp.where(defined, exact, 0)

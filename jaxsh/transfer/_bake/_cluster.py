@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import ArrayLike, Float, Int
 
-from ..._core.checks import as_path, check_flag
+from ..._core.checks import as_path, check_flag, check_type
 from ..._core.host import cores
 from ..._core.words import reason
-from ...geometry import Mesh
+from ...geometry import Mesh, Surface
 from .._stored import StoredTransfer, open
+from .._surfaces import points_and_normals
 from ._blind import why_blind
 from ._device import scene_for
 from ._faults import checked, faults
@@ -23,7 +24,7 @@ from ._job import Prepared
 from ._kept import BakeStore, refuse
 from ._origins import origins
 from ._passes import progress_bar
-from ._receivers import unit_normals
+from ._receivers import unit_normals, units_of
 from ._worker import Task, let_go
 
 # Blocks in the scheduler's hands at once: enough for thousands of workers, and for a bake of any
@@ -35,7 +36,7 @@ _PLAIN: Any = {"dashboard_address": ":0"}
 
 def bake_on(
     client: Any,
-    mesh: Mesh,
+    surface: Surface,
     degree: int,
     *,
     store: str | os.PathLike[str],
@@ -45,6 +46,7 @@ def bake_on(
     albedo: Float[ArrayLike, "*v"] = 0.5,
     ray_bias: float | None = None,
     offset: float | None = None,
+    scene: Mesh | None = None,
     device: bool = False,
     seed: int = 0,
     chunk: int = 256,
@@ -52,8 +54,8 @@ def bake_on(
 ) -> StoredTransfer:
     """Bake into a store on the workers of a Dask cluster, many machines if need be.
 
-    A task is a block of vertices, whose coefficients a worker writes to the store by itself; the
-    scheduler sees a bit a vertex at most. A worker reads what it needs from the store and builds
+    A task is a block of points, whose coefficients a worker writes to the store by itself; the
+    scheduler sees a bit a point at most. A worker reads what it needs from the store and builds
     the tree of the mesh once. So a worker may die and others come at any time: what it was at is
     done again. After any end of this call, the same call goes on with what is missing or
     damaged, and so does `bake(..., store=...)`, to the same bits (on processors of one kind).
@@ -64,9 +66,10 @@ def bake_on(
       on this machine: one process with a thread a core.
     - `store`: a folder that this process and all workers see under one path.
     - `device`: casts rays by JAX on each worker's default device, and not by Embree.
-    - `chunk`: vertices at a time on each thread of a worker, rounded up to a multiple of 64.
+    - `scene`: the mesh that stops rays, where that is not the surface's own.
+    - `chunk`: points at a time on each thread of a worker, rounded up to a multiple of 64.
     - `progress`: shows a bar when standard error is a terminal and the bake takes over a second.
-    - all others: as for `bake`. There is no `scene`: the mesh alone stops rays.
+    - all others: as for `bake`. One mesh alone stops rays: no scene of rays reaches the workers.
 
     **Returns** the `StoredTransfer` that `transfer.open` gives. Nothing of the size of its
     coefficients is ever in the memory of this process. A worker process holds the mesh's tree, up
@@ -75,7 +78,7 @@ def bake_on(
 
     Workers need this version of jaxsh. Where there are none, the call waits for some. A block
     fails for good where four workers died of it, as of too little memory. One `UserWarning` counts
-    vertices without light, as in `bake`.
+    points without light, as in `bake`.
 
     Raises `ImportError` without the package `distributed` (the extra `scale`), `ConnectionError`
     where the scheduler cannot be reached or goes away, `RuntimeError` for a block that workers
@@ -95,8 +98,10 @@ def bake_on(
     (300, 2)
     """
     path = as_path(store, "store").absolute()
-    arguments = checked(
-        mesh,
+    if scene is not None:
+        check_type("scene", scene, Mesh)
+    arguments, mesh, _ = checked(
+        surface,
         degree,
         directions=directions,
         shadows=shadows,
@@ -106,28 +111,36 @@ def bake_on(
         offset=offset,
         seed=seed,
         chunk=chunk,
+        scene=scene,
         device=check_flag("device", device),
     )
-    identity = arguments.identity(mesh)
+    identity = arguments.identity(surface)
     refuse(path, identity)
     path.parent.mkdir(parents=True, exist_ok=True)  # or fails before all work
-    normals = unit_normals(mesh)
+    normals = units_of(surface)
     with _connected(client) as connected:
-        start = None
+        start, reflector = None, None
         if shadows:
-            scene = scene_for(mesh, arguments.device)
-            start = origins(mesh, normals, scene, ray_bias, offset)
-            del scene  # the workers have theirs
+            caster = scene_for(mesh, arguments.device)
+            start = origins(surface, normals, caster, ray_bias, offset, mesh=mesh)
+            if arguments.bounces and arguments.apart:
+                assert mesh is not None
+                units = unit_normals(mesh)
+                off = origins(mesh, units, caster, ray_bias, offset)
+                reflector = Prepared(units, off.positions)
+            del caster  # the workers have theirs
 
         def why(blind: Int[np.ndarray, " n"]) -> list[str]:
-            assert start is not None  # without shadows no vertex is blind
-            return why_blind(mesh, scene_for(mesh, arguments.device), blind, normals, start)
+            assert start is not None  # without shadows no point is blind
+            caster = scene_for(mesh, arguments.device)
+            return why_blind(surface, mesh, caster, blind, normals, start)
 
-        positions = np.asarray(mesh.vertices) if start is None else start.positions
-        kept = BakeStore.of(path, mesh, arguments, Prepared(normals, positions), identity)
+        positions = np.asarray(points_and_normals(surface)[0]) if start is None else start.positions
+        prepared = Prepared(normals, positions)
+        kept = BakeStore.of(path, surface, mesh, arguments, prepared, reflector, identity)
         if not kept.finished:
             blind = _fill(connected, kept, identity, chunk, progress)
-            kept.finish(faults(mesh, normals, blind, why))
+            kept.finish(faults(surface, normals, blind, why))
     if said := kept.attributes["warning"]:
         warnings.warn(said, UserWarning, stacklevel=2)
     return open(path)
@@ -171,14 +184,16 @@ def _connected(client: Any) -> Iterator[Any]:
 def _fill(
     client: Any, kept: BakeStore, identity: dict[str, Any], chunk: int, progress: bool
 ) -> Int[np.ndarray, " n"]:
-    """Fill all passes of a store; gives the vertices that have a normal and see nothing."""
+    """Fill all passes of a store; gives the points that have a normal and see nothing."""
     blind = np.zeros(kept.num_points, bool)
-    with progress_bar(kept.passes * kept.num_points, progress) as bar, _letting_go(client):
-        for number in range(kept.passes):
+    blocks = [kept.blocks_of_pass(number) for number in range(len(kept.steps))]
+    total = sum(kept.rows_of_pass(n, count - 1).stop for n, count in enumerate(blocks))
+    with progress_bar(total, progress) as bar, _letting_go(client):
+        for number, whole in enumerate(blocks):
             task = Task(str(kept.path), identity, number, chunk)
-            with contextlib.closing(_answers(client, task, kept.num_blocks)) as answers:
+            with contextlib.closing(_answers(client, task, whole)) as answers:
                 for block, found in answers:
-                    part = kept.rows(block)
+                    part = kept.rows_of_pass(number, block)
                     count = part.stop - part.start
                     if found is not None:
                         blind[part] = np.unpackbits(np.frombuffer(found, np.uint8), count=count)

@@ -3,7 +3,7 @@
 import contextlib
 import threading
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +15,7 @@ from ..._core.checks import described
 from ...geometry import JaxRayScene, Mesh, RayScene, ray_scene
 from ._chunk import Reflectors, bounced_rows, lights, reflectors, shadowed_rows
 from ._gather import TILE
-from ._job import BakeArguments, Job, Prepared
+from ._job import BakeArguments, Job, Prepared, Step
 
 # Rays in a chunk for each lane: many, since the last ones leave lanes idle.
 _RAYS = 32
@@ -47,31 +47,70 @@ def _default_platform() -> str:
     return next(iter(jnp.zeros(()).devices())).platform
 
 
-def scene_for(mesh: Mesh, device: bool, threads: int | None = None) -> RayScene:
+def scene_for(mesh: Mesh | None, device: bool, threads: int | None = None) -> RayScene:
     """Build the scene of a mesh alone."""
+    assert mesh is not None  # points without a scene are refused
     return JaxRayScene(mesh) if device else ray_scene(mesh, threads=threads)
 
 
-def job_of(
-    mesh: Mesh | None, arguments: BakeArguments, scene: RayScene | None, prepared: Prepared
-) -> Job:
-    """Make the job that casts rays where the arguments say."""
-    if arguments.device and isinstance(scene, JaxRayScene):
-        return DeviceJob(mesh, arguments, scene, prepared)
-    return Job(mesh, arguments, scene, prepared)
+class Jobs(NamedTuple):
+    """Holds who computes the passes of a bake."""
+
+    steps: list[Step]
+    points: Job
+    reflector: Job | None  # of the vertices that light bounces off, where these are not the points
+
+    def of(self, number: int) -> Job:
+        """Give the job of a pass."""
+        if self.reflector is not None and self.steps[number].reflector:
+            return self.reflector
+        return self.points
+
+    def rows(
+        self,
+        number: int,
+        rows: slice,
+        before: Float[np.ndarray, "m k"] | None = None,
+        direct: Float[np.ndarray, "rows k"] | None = None,
+    ) -> Float[np.ndarray, "rows k"]:
+        """Compute what `Job.rows` does, of a pass."""
+        return self.of(number).rows(self.steps[number].before is not None, rows, before, direct)
+
+
+def jobs_of(
+    mesh: Mesh | None,  # that light bounces off; needed for that alone
+    arguments: BakeArguments,
+    scene: RayScene | None,
+    points: Prepared,
+    reflector: Prepared | None,
+) -> Jobs:
+    """Make the jobs of a bake, whose rays are cast where the arguments say."""
+
+    def job(prepared: Prepared, cosine: bool) -> Job:
+        if arguments.device and isinstance(scene, JaxRayScene):
+            return DeviceJob(mesh, arguments, scene, prepared, cosine)
+        return Job(mesh, arguments, scene, prepared, cosine)
+
+    first = None if reflector is None else job(reflector, cosine=True)
+    return Jobs(arguments.steps, job(points, arguments.cosine), first)
 
 
 class DeviceJob(Job):
-    """Computes what a `Job` does with one program for each chunk of vertices, on a device.
+    """Computes what a `Job` does with one program for each chunk of points, on a device.
 
-    Chunks lie fixed on the mesh, and a vertex has its place in one, so that its sums are added in
+    Chunks lie fixed on the points, and each has its place in one, so that its sums are added in
     one order whatever rows are asked for.
     """
 
     def __init__(
-        self, mesh: Mesh | None, arguments: BakeArguments, scene: JaxRayScene, prepared: Prepared
+        self,
+        mesh: Mesh | None,
+        arguments: BakeArguments,
+        scene: JaxRayScene,
+        prepared: Prepared,
+        cosine: bool,
     ):
-        super().__init__(mesh, arguments, scene, prepared)
+        super().__init__(mesh, arguments, scene, prepared, cosine)
         self._scene = scene
         wanted = max(scene.lanes * _RAYS // arguments.directions, 1)
         whole = 1 << (self.num_points - 1).bit_length()
@@ -83,7 +122,7 @@ class DeviceJob(Job):
 
     def rows(
         self,
-        number: int,
+        bounce: bool,
         rows: slice,
         before: Float[np.ndarray, "v k"] | None = None,
         direct: Float[np.ndarray, "rows k"] | None = None,
@@ -91,7 +130,7 @@ class DeviceJob(Job):
         """Compute what `Job.rows` does, and wait for it."""
         with self._there():
             result = np.concatenate(
-                [np.asarray(each) for each in self._chunks(number, rows, before)]
+                [np.asarray(each) for each in self._chunks(bounce, rows, before)]
             )
         if direct is not None:
             result += direct
@@ -100,14 +139,14 @@ class DeviceJob(Job):
     def whole(
         self,
         bar: Any,
-        number: int,
+        bounce: bool,
         before: Float[Array, "v k"] | None = None,
         direct: Float[Array, "v k"] | None = None,
     ) -> Float[Array, "v k"]:
-        """Compute what `Job.rows` does of all vertices; it stays on the device."""
+        """Compute what `Job.rows` does of all points; it stays on the device."""
         blocks = []
         with self._there():
-            for values in self._chunks(number, slice(0, self.num_points), before):
+            for values in self._chunks(bounce, slice(0, self.num_points), before):
                 blocks.append(values)
                 if len(blocks) >= UNDER_WAY:
                     bar.update(len(blocks[-UNDER_WAY].block_until_ready()))
@@ -123,10 +162,10 @@ class DeviceJob(Job):
         with jax.enable_x64(True), jax.default_device(self._scene.device):
             yield
 
-    def _chunks(self, number: int, rows: slice, before: Any) -> Iterator[Float[Array, "m k"]]:
+    def _chunks(self, bounce: bool, rows: slice, before: Any) -> Iterator[Float[Array, "m k"]]:
         """Start the programs of the chunks that hold some rows, and give the rows of each."""
         scene, size, start = self._scene, self.chunk, self.prepared
-        light = self._reflected(before) if number else self._direct
+        light = self._reflected(before) if bounce else self._direct
         for first in range(rows.start - rows.start % size, rows.stop, size):
             part = slice(max(first, rows.start), min(first + size, rows.stop))
             at, count = part.start - first, part.stop - part.start
@@ -136,10 +175,11 @@ class DeviceJob(Job):
             origins[at : at + count] = scene.frame.into(start.origins[part])
             normals[at : at + count] = start.normals[part]
             given = scene.tree, jnp.asarray(origins), jnp.asarray(normals), light
-            if number == 0:
-                values = shadowed_rows(*given, degree=self.arguments.degree, lanes=scene.lanes)
+            how = {"lanes": scene.lanes, "cosine": self.cosine}
+            if bounce:
+                values = bounced_rows(*given, **how)
             else:
-                values = bounced_rows(*given, lanes=scene.lanes)
+                values = shadowed_rows(*given, degree=self.arguments.degree, **how)
             whole = count == size
             yield values if whole else lax.dynamic_slice_in_dim(values, at, count)
 

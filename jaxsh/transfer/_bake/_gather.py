@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Float, Int
 from ..._core.linalg import matmul
 from ...geometry import RayScene
 from ._directions import Directions
-from ._receivers import Receivers, Surface, unshadowed
+from ._receivers import Faces, Receivers, unshadowed
 
 # Rows of every product: with one fixed shape a vertex's sums are added in one fixed order,
 # whatever the block it comes in.
@@ -26,15 +26,17 @@ def shadowed(
 ) -> Float[np.ndarray, "rows k"]:
     """Project visibility times cosine: the cosine's coefficients less those of the blocked part.
 
+    Without cosine visibility alone, likewise.
+
     The cosine's are exact, so that only the blocked part carries the error of the directions, and
     none is left where nothing is blocked. Exactly zero where no ray gets out.
     """
     normals = receivers.normals[rows]
-    cosines = _in_tiles(normals, directions.vectors.T)
+    cosines = _cosines(receivers, directions.vectors, rows)
     above = cosines > 0
     blocked = _blocked(scene, receivers.origins[rows], directions, above)
     part = _in_tiles(cosines * blocked, directions.basis)
-    coefficients = unshadowed(normals, degree) - part
+    coefficients = unshadowed(normals, degree, receivers.cosine) - part
     coefficients[above.any(axis=1) & (above == blocked).all(axis=1)] = 0
     return coefficients
 
@@ -74,7 +76,7 @@ def bounced(
     scene: RayScene,
     receivers: Receivers,
     vectors: Float[np.ndarray, "d 3"],
-    surface: Surface,
+    surface: Faces,
     share: Float[np.ndarray, " v_or_1"],
     before: Float[np.ndarray, "v k"],
     rows: slice,
@@ -85,7 +87,7 @@ def bounced(
     """
     from scipy.sparse import csr_array
 
-    cosines = _in_tiles(receivers.normals[rows], vectors.T)
+    cosines = _cosines(receivers, vectors, rows)
     rays = _rays(receivers.origins[rows], vectors, cosines > 0)
     hit = scene.closest_hit(rays.origins, rays.directions)
     met = np.flatnonzero(hit.mesh == 0)
@@ -98,6 +100,16 @@ def bounced(
     weights *= share[corners] if len(share) > 1 else share
     shape = len(cosines), len(before)
     return csr_array((weights.ravel(), corners.ravel(), ends), shape) @ before
+
+
+def _cosines(
+    receivers: Receivers, vectors: Float[np.ndarray, "d 3"], rows: slice
+) -> Float[np.ndarray, "rows d"]:
+    """Compute by what light along each direction counts; no ray is cast where that is not > 0."""
+    normals = receivers.normals[rows]
+    if receivers.cosine:
+        return _in_tiles(normals, vectors.T)
+    return np.ones((len(normals), len(vectors)), normals.dtype)
 
 
 class _Rays(NamedTuple):

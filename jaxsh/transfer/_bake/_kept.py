@@ -1,23 +1,25 @@
 """The store of a bake: made once, filled block by block, refused where it is of another bake."""
 
+import functools
 from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float, Int
 
 from ... import geometry
 from ..._core.words import reason
-from ...geometry import Mesh, RayScene
+from ...geometry import Mesh, Surface
 from ...harmonics import num_coefficients
 from .._store import BlockStore, DamagedError
 from .._store_make import block_rows, make, sweep
-from ._device import job_of, scene_for
-from ._job import BakeArguments, Job, Prepared
+from .._surfaces import points_and_normals
+from ._device import Jobs, jobs_of, scene_for
+from ._job import USUAL, BakeArguments, Prepared, Step
 
-_PASSES = "passes"
+_PASSES, _OCCLUDER = "passes", "occluder"
 
 
 class BakeStore(BlockStore):
@@ -30,68 +32,95 @@ class BakeStore(BlockStore):
     @staticmethod
     def of(
         path: Path,
-        mesh: Mesh,
+        surface: Surface,
+        mesh: Mesh | None,
         arguments: BakeArguments,
         prepared: Prepared,
+        reflector: Prepared | None,
         identity: dict[str, Any],
     ) -> "BakeStore":
         """Make the store of a bake, or mend the one that is there, but for its passes.
 
         `identity` is that of the arguments. Raises what `refuse` does.
         """
+        positions, normals = points_and_normals(surface)
         arrays = {
-            "positions": np.asarray(mesh.vertices),
-            "normals": np.asarray(mesh.normals),
-            "faces": np.asarray(mesh.faces),
+            "positions": np.asarray(positions),
+            "normals": np.asarray(np.zeros_like(positions) if normals is None else normals),
             "unit_normals": prepared.normals,
             "origins": prepared.origins,
             "albedo": np.atleast_1d(arguments.albedo).astype(np.float64),
         }
-        names = [_name(number, arguments.passes) for number in range(arguments.passes)]
-        shape = len(prepared.normals), num_coefficients(arguments.degree)
-        later = dict.fromkeys(names, (shape, prepared.normals.dtype))
+        if isinstance(surface, Mesh):
+            arrays["faces"] = np.asarray(surface.faces)
+        if arguments.apart and mesh is not None:
+            arrays |= _of_occluder(mesh, reflector)
+        steps, width = arguments.steps, num_coefficients(arguments.degree)
+        later, apart = {}, [name for name in arrays if name.startswith(f"{_OCCLUDER}/")]
+        for number, step in enumerate(steps):
+            name, made = _name(number, len(steps)), prepared
+            if step.reflector and reflector is not None:
+                made = reflector
+                apart.append(name)
+            later[name] = (len(made.normals), width), made.normals.dtype
+        # In blocks of their own, as there may be far more or fewer of them than points.
+        apart = dict.fromkeys(apart, 0 if mesh is None else block_rows(len(mesh.vertices)))
         if not _stands(path):
-            arrays["neighbors"] = np.asarray(geometry.neighbors(mesh))
+            arrays["neighbors"] = np.asarray(neighbors_of(surface))
             about = {"degree": arguments.degree, "arguments": identity}
-            if make(path, arrays, later, block_rows(shape[0]), about):
+            if arguments.surface != "vertices":  # what older versions do not read
+                about |= {"surface": arguments.surface, "cosine": arguments.cosine}
+            if make(path, arrays, later, block_rows(len(prepared.normals)), about, apart):
                 return BakeStore(path)
         refuse(path, identity)
         store = BakeStore(path)
         complete = {name: (array.shape, array.dtype) for name, array in arrays.items()}
-        store.add(complete | {"coefficients": later["coefficients"]})
+        store.add(complete | {"coefficients": later["coefficients"]}, apart)
         store.put(**arrays)
         if store.missing("neighbors", check=True):
-            store.put(neighbors=np.asarray(geometry.neighbors(mesh)))
+            store.put(neighbors=np.asarray(neighbors_of(surface)))
         if store.finished:
             store.tidy("coefficients")  # where it was stopped at that
             store.drop(_PASSES)
             sweep(path)
         else:
-            store.add(later)
+            store.add(later, apart)
         return store
 
-    @property
-    def passes(self) -> int:
-        """Count the passes of the bake over the vertices."""
-        return 1 + self.attributes["arguments"]["bounces"]
-
-    def job(self, scene: RayScene | None = None, *, threads: int | None = None) -> Job:
-        """Build the job from what is stored; by default the mesh is the scene, by `threads`."""
+    @functools.cached_property
+    def arguments(self) -> BakeArguments:
+        """Read the arguments of the bake."""
         albedo = self.whole("albedo")
-        arguments = BakeArguments.restored(
+        return BakeArguments.restored(
             self.attributes["arguments"], albedo if len(albedo) > 1 else albedo.reshape(())
         )
-        if scene is None and arguments.shadows:
+
+    @functools.cached_property
+    def steps(self) -> list[Step]:
+        """List the passes of the bake."""
+        return self.arguments.steps
+
+    def jobs(self, *, threads: int | None = None) -> Jobs:
+        """Build the jobs from what is stored, by `threads`; the mesh alone stops rays."""
+        arguments, scene, reflector = self.arguments, None, None
+        if arguments.shadows:
             scene = scene_for(self.mesh(), arguments.device, threads)
             if not arguments.device:
                 # Embree builds its tree while neither the mesh nor what follows is in memory.
                 scene.occluded(np.zeros(3), np.ones(3))
         prepared = Prepared(self.whole("unit_normals"), self.whole("origins"))
-        return job_of(self.mesh() if arguments.bounces else None, arguments, scene, prepared)
+        if arguments.bounces and arguments.apart:
+            held = (self.whole(f"{_OCCLUDER}/{name}") for name in ("normals", "origins"))
+            reflector = Prepared(*held)
+        mesh = self.mesh() if arguments.bounces else None
+        return jobs_of(mesh, arguments, scene, prepared, reflector)
 
     def mesh(self) -> Mesh:
-        """Read the mesh."""
-        vertices, faces, normals = map(self.whole, ("positions", "faces", "normals"))
+        """Read the mesh that stops rays, and that light bounces off."""
+        names = "positions", "faces", "normals"
+        if self.arguments.apart:
+            names = (f"{_OCCLUDER}/{name}" for name in ("vertices", "faces", "normals"))
+        vertices, faces, normals = map(self.whole, names)
         with jax.enable_x64(True):  # as stored, whatever this process computes in
             return Mesh(jnp.asarray(vertices), jnp.asarray(faces), jnp.asarray(normals))
 
@@ -107,12 +136,20 @@ class BakeStore(BlockStore):
         """Write one block of a pass: its file is there whole, or not at all."""
         self.write(self._pass(number), block, values)
 
+    def blocks_of_pass(self, number: int) -> int:
+        """Count the blocks of a pass."""
+        return self.blocks(self._pass(number))
+
+    def rows_of_pass(self, number: int, block: int) -> slice:
+        """Tell which rows of a pass a block holds."""
+        return self.rows(block, self._pass(number))
+
     def fill(self, number: int, rows: Float[np.ndarray, "v k"]) -> list[slice]:
         """Fill in what is there of a pass, and list the runs of rows that are not."""
         name, missing = self._pass(number), []
         room = self.room(name)
-        for block in range(self.num_blocks):
-            part = self.rows(block)
+        for block in range(self.blocks(name)):
+            part = self.rows(block, name)
             try:
                 rows[part] = self.read(name, block, room)
             except DamagedError:
@@ -121,10 +158,12 @@ class BakeStore(BlockStore):
                 missing.append(part)
         return missing
 
-    def ended_by(self, part: slice) -> range:
-        """Tell the blocks whose last row is in a part."""
-        stop = self.num_blocks if part.stop == self.num_points else part.stop // self.block_rows
-        return range(part.start // self.block_rows, stop)
+    def ended_by(self, number: int, part: slice) -> range:
+        """Tell the blocks of a pass whose last row is in a part."""
+        whole, size = self.blocks_of_pass(number), self.rows_of_pass(number, 0)
+        end = part.stop // max(size.stop, 1)
+        last = self.rows_of_pass(number, whole - 1).stop == part.stop
+        return range(part.start // max(size.stop, 1), whole if last else end)
 
     @property
     def finished(self) -> bool:
@@ -138,7 +177,7 @@ class BakeStore(BlockStore):
         self.drop(_PASSES)
 
     def _pass(self, number: int) -> str:
-        return _name(number, self.passes)
+        return _name(number, len(self.steps))
 
 
 def refuse(path: Path, identity: dict[str, Any]) -> None:
@@ -147,12 +186,33 @@ def refuse(path: Path, identity: dict[str, Any]) -> None:
         return
     found = BlockStore(path).attributes.get("arguments")
     found = found if isinstance(found, dict) else {}
-    for name, value in identity.items():
-        if found.get(name) != value:
-            raise ValueError(
-                f"{path}: the store of another bake: its {name} is {reason(str(found.get(name)))}, "
-                f"and {value} here; it is left as it is"
-            )
+    if name := differing(found, identity):
+        said = reason(str((USUAL | found).get(name)))
+        raise ValueError(
+            f"{path}: the store of another bake: its {name} is {said}, and {identity[name]} here; "
+            "it is left as it is"
+        )
+
+
+def differing(found: dict[str, Any], identity: dict[str, Any]) -> str | None:
+    """Name the first argument in which a store is another bake's; None where it is this one's."""
+    found = USUAL | found
+    return next((name for name, value in identity.items() if found.get(name) != value), None)
+
+
+def neighbors_of(surface: Surface) -> Int[Array | np.ndarray, "v n"]:
+    """Give the table of neighbors: points and texels have none, and stand for themselves."""
+    if isinstance(surface, Mesh):
+        return geometry.neighbors(surface)
+    return jnp.arange(surface.num_points, dtype=jnp.int32)[:, None]
+
+
+def _of_occluder(mesh: Mesh, reflector: Prepared | None) -> dict[str, np.ndarray]:
+    """Give what is stored of the mesh in the way of points that are not its vertices."""
+    arrays = {"vertices": mesh.vertices, "faces": mesh.faces, "normals": mesh.normals}
+    if reflector is not None:
+        arrays |= reflector._asdict()  # whose normals are of unit length
+    return {f"{_OCCLUDER}/{name}": np.asarray(array) for name, array in arrays.items()}
 
 
 def _stands(path: Path) -> bool:

@@ -1,13 +1,13 @@
 """Origins of rays: a little off the surface, by as little as its coordinates allow."""
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ...geometry import Mesh, RayScene
+from ...geometry import Mesh, Points, RayScene, Surface
 
 # In half-extents of the mesh. Against `ray_bias=3e-7` the coefficients at degree 10 and 2,048
 # directions change by 0.02 to 0.15 % (RMS, seven scanned meshes); `ray_bias=1e-4` by 0.05 to 1.5 %.
@@ -17,13 +17,14 @@ _OF_EDGE = 1e-3
 # In units of what coordinates are rounded to: a surface is uneven by about one.
 _ULPS = 4
 _LOUD = 0.1  # of a vertex's shortest edge; warned of where half of the vertices have more
+_BESIDE = 1e-3  # a texel with less of a corner's weight lies on the edge across from it
 _SINGLE = float(np.finfo(np.float32).eps)
 # Faces or vertices in a block: what is made on the way is as large as a block, not as the mesh.
 _BLOCK = 2**18
 
 
 class Origins(NamedTuple):
-    """Holds where the rays of V vertices start."""
+    """Holds where the rays of V points start."""
 
     positions: Float[np.ndarray, "v 3"]
     distance: Float[np.ndarray, " v"]  # off the surface
@@ -32,47 +33,96 @@ class Origins(NamedTuple):
 
 
 def origins(
-    mesh: Mesh,
+    surface: Surface,
     normals: Float[np.ndarray, "v 3"],
     scene: RayScene,
     ray_bias: float | None,
     offset: float | None,
+    *,
+    mesh: Mesh | None = None,
 ) -> Origins:
-    """Take each vertex a little off the surface.
+    """Take each point a little off the surface; those of a volume stay where they are.
 
     Vertices at a rim, also one where only the normals break, start as far inwards too, or they
-    would start within the plane of a surface that meets theirs there.
+    would start within the plane of a surface that meets theirs there; and so do texels on it. A
+    bias of points and texels is a share of the `mesh` in their way.
     """
-    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    half = float(np.ptp(vertices.astype(np.float64), axis=0).max()) / 2
-    shortest, longest = _edges(vertices, faces)
-    least = _ULPS * _rounding(vertices, np.where(longest > 0, longest, 2 * half), scene)
+    points, rim, size, inwards = _measured(surface, mesh)
+    single = np.promote_types(points.dtype, np.float32)
+    if not isinstance(surface, Mesh) and surface.normals is None:
+        none = np.zeros(len(points))
+        return Origins(points.astype(single, copy=False), none, none, chosen=False)
+    half, shortest, longest = size
+    least = _ULPS * _rounding(points, np.where(longest > 0, longest, 2 * half), scene)
     automatic = offset is None and ray_bias is None
     if automatic:
         distance = np.maximum(np.minimum(_SHARE * half, _OF_EDGE * shortest), least)
     else:
         wanted = offset if offset is not None else (ray_bias or 0) * half
         distance = np.maximum(wanted, least)
-    _warn_of_large(distance, shortest, least, vertices)
-
-    rim = _open(faces, len(vertices))
-    inwards, every = _inwards(vertices, faces, rim), np.arange(len(vertices))
+    _warn_of_large(distance, shortest, least, points)
+    every = np.arange(len(points))
 
     def lifted(by: Float[np.ndarray, " n"], at: slice | Int[np.ndarray, " n"]) -> np.ndarray:
-        start = vertices[at].astype(np.float64)
+        start = points[at].astype(np.float64)
         start += by[:, None] * normals[at]
         edge = rim[at]
         if edge.any():
             aside = np.minimum(by, shortest[at] / 10)[edge, None]
-            start[edge] += aside * inwards.of(every[at][edge])
-        return start.astype(np.promote_types(vertices.dtype, np.float32))
+            start[edge] += aside * inwards(every[at][edge])
+        return start.astype(single)
 
-    positions = np.empty(vertices.shape, np.promote_types(vertices.dtype, np.float32))
-    for part in _blocks(len(vertices)):
+    positions = np.empty(points.shape, single)
+    for part in _blocks(len(points)):
         if automatic:
             distance[part] = _within_gaps(scene, normals, distance, least, lifted, part)
         positions[part] = lifted(distance[part], part)
     return Origins(positions, distance, least, not automatic)
+
+
+class _Size(NamedTuple):
+    """Holds how large a surface is, as a whole and around each of V points."""
+
+    half: float  # of its longest extent
+    shortest: Float[np.ndarray, " v"]  # edge; infinite where there is none
+    longest: Float[np.ndarray, " v"]
+
+
+class _Measured(NamedTuple):
+    points: Float[np.ndarray, "v 3"]
+    rim: Bool[np.ndarray, " v"]  # start aside too
+    size: _Size
+    inwards: Callable[[Int[np.ndarray, " n"]], Float[np.ndarray, "n 3"]]  # unit vectors, or zero
+
+
+def _measured(surface: Surface, mesh: Mesh | None) -> _Measured:
+    """Measure a surface; of points alone no more is known than the `mesh` in their way."""
+    if isinstance(surface, Mesh):
+        points, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
+        rim = _open(faces, len(points))
+        size = _Size(_half(points), *_edges(points, faces))
+        return _Measured(points, rim, size, _inwards(points, faces, rim).of)
+    points = np.asarray(surface.positions)
+    half = _half(points if mesh is None else np.asarray(mesh.vertices))
+    if isinstance(surface, Points):
+        far, nowhere = np.full(len(points), np.inf), np.zeros(len(points), bool)
+        size = _Size(half, shortest=far, longest=np.full(len(points), 2 * half))
+        return _Measured(points, nowhere, size, lambda some: np.zeros((len(some), 3)))
+    vertices, faces = np.asarray(surface.mesh.vertices), np.asarray(surface.mesh.faces)
+    shortest, longest = _edges(vertices, faces)
+    corners, weights = faces[np.asarray(surface.face)], np.asarray(surface.barycentric)
+    off = weights < _BESIDE  # the corners across from which a texel lies
+    rim = off.any(axis=1) & (off | _open(faces, len(vertices))[corners]).all(axis=1)
+
+    def inwards(some: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
+        return _unit(vertices[corners[some]].mean(axis=1, dtype=np.float64) - points[some])
+
+    size = _Size(half, shortest[corners].min(axis=1), longest[corners].max(axis=1))
+    return _Measured(points, rim, size, inwards)
+
+
+def _half(points: Float[np.ndarray, "v 3"]) -> float:
+    return float(np.ptp(points.astype(np.float64), axis=0).max()) / 2
 
 
 def _blocks(count: int) -> Iterator[slice]:

@@ -12,9 +12,8 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._core.host import aligned, cores
-from ._device import UNDER_WAY, DeviceJob
+from ._device import UNDER_WAY, DeviceJob, Jobs
 from ._gather import TILE
-from ._job import Job
 from ._kept import BakeStore
 
 Gather = Callable[[slice], np.ndarray]
@@ -22,12 +21,12 @@ Gather = Callable[[slice], np.ndarray]
 
 @dataclasses.dataclass(frozen=True)
 class Passes:
-    """Fills arrays of one shape, one for each pass, on threads, in parts of whole tiles.
+    """Fills arrays, one for each pass, on threads, in parts of whole tiles.
 
     Blocks that the store holds are not computed again, and new ones are added to it.
     """
 
-    job: Job
+    jobs: Jobs
     chunk: int
     store: BakeStore | None
     bar: Any
@@ -35,21 +34,23 @@ class Passes:
     def run(
         self,
         number: int,
-        before: Float[np.ndarray, "v k"] | None = None,
+        before: Float[np.ndarray, "m k"] | None = None,
         direct: Float[np.ndarray, "v k"] | None = None,
     ) -> Float[np.ndarray, "v k"]:
         """Compute the coefficients of pass `number`, for which see `Job.rows`."""
-        count, store = self.job.num_points, self.store
-        rows = aligned((count, self.job.width), self.job.dtype)
+        job, store = self.jobs.of(number), self.store
+        count = job.num_points
+        rows = aligned((count, job.width), job.dtype)
         missing = [slice(0, count)] if store is None else store.fill(number, rows)
         self.bar.update(count - sum(part.stop - part.start for part in missing))
 
         def gather(part: slice) -> np.ndarray:
-            return self.job.rows(number, part, before, None if direct is None else direct[part])
+            own = None if direct is None else direct[part]
+            return self.jobs.rows(number, part, before, own)
 
         size, threads = -(-self.chunk // TILE) * TILE, cores()
-        if isinstance(self.job, DeviceJob):
-            size, threads = self.job.chunk, UNDER_WAY
+        if isinstance(job, DeviceJob):
+            size, threads = job.chunk, UNDER_WAY
         parts = [
             slice(start, min(start + size, run.stop))
             for run in missing
@@ -59,8 +60,8 @@ class Passes:
             for part, values in blocks:
                 rows[part] = values
                 if store is not None:
-                    for block in store.ended_by(part):
-                        store.write_pass(number, block, rows[store.rows(block)])
+                    for block in store.ended_by(number, part):
+                        store.write_pass(number, block, rows[store.rows_of_pass(number, block)])
                 self.bar.update(len(values))
         return rows
 
@@ -73,13 +74,13 @@ class _NoBar(contextlib.nullcontext):
 
 
 def progress_bar(total: int, shown: bool):
-    """Count vertices on a terminal, in a context, once it has taken more than a second."""
+    """Count points on a terminal, in a context, once it has taken more than a second."""
     if not shown:
         return _NoBar()
     from tqdm import tqdm
 
     # `disable=None` hides the bar when stderr is not a terminal.
-    return tqdm(total=total, desc="bake", unit=" vertices", delay=1, file=sys.stderr, disable=None)
+    return tqdm(total=total, desc="bake", unit=" points", delay=1, file=sys.stderr, disable=None)
 
 
 def _in_order(

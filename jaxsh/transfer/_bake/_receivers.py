@@ -1,6 +1,7 @@
 """Receivers of light: points off the surface, their normals, their unshadowed coefficients."""
 
 import functools
+import math
 from typing import NamedTuple
 
 import jax
@@ -8,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ...geometry import Mesh
+from ...geometry import Mesh, Surface
 from ...harmonics import clamped_cosine, convolve, evaluate, num_coefficients
 
 # Faces cancel where the sum of their area vectors is but the rounding of its terms.
@@ -21,23 +22,33 @@ class Receivers(NamedTuple):
 
     origins: Float[np.ndarray, "v 3"]  # of rays, a little off the surface
     normals: Float[np.ndarray, "v 3"]  # unit, zero where undefined
+    cosine: bool = True  # False: light from all around counts alike
 
 
-class Surface(NamedTuple):
+class Faces(NamedTuple):
     """Holds the faces that light bounces off."""
 
     faces: Int[np.ndarray, "f 3"]
     outward: Float[np.ndarray, "f 3"]  # normals of any length
 
 
-def surface(mesh: Mesh) -> Surface:
+def faces_of(mesh: Mesh) -> Faces:
     """Take the mesh's faces, with their outward normals."""
     faces = np.asarray(mesh.faces)
-    return Surface(faces, areas_of(np.asarray(mesh.vertices), faces).T)
+    return Faces(faces, areas_of(np.asarray(mesh.vertices), faces).T)
 
 
-def unshadowed(normals: Float[np.ndarray, "v 3"], degree: int) -> Float[np.ndarray, "v k"]:
-    """Expand the clamped cosine about each normal: λ_l y_lm(n), zero about a zero normal."""
+def unshadowed(
+    normals: Float[np.ndarray, "v 3"], degree: int, cosine: bool = True
+) -> Float[np.ndarray, "v k"]:
+    """Expand the clamped cosine about each normal: λ_l y_lm(n), zero about a zero normal.
+
+    Without it the whole sphere, whose only coefficient is √4π.
+    """
+    if not cosine:
+        whole = np.zeros((len(normals), num_coefficients(degree)), normals.dtype)
+        whole[:, 0] = math.sqrt(4 * math.pi)
+        return whole
     defined = normals.any(axis=1, keepdims=True)
     basis = basis_at(np.where(defined, normals, _UP.astype(normals.dtype)), degree)
     lambdas = np.asarray(_cosine_lambdas(degree), basis.dtype)
@@ -64,7 +75,21 @@ def unit_normals(mesh: Mesh) -> Float[np.ndarray, "v 3"]:
     Undefined are those that are zero, NaN or infinite, and those of a vertex whose faces cancel, so
     that the mean of their normals is rounding. A vertex in no face keeps the normal that it has.
     """
-    normals = np.asarray(mesh.normals)
+    return _at_unit_length(np.asarray(mesh.normals), but=_cancelled(mesh))
+
+
+def units_of(surface: Surface) -> Float[np.ndarray, "v 3"]:
+    """Scale a surface's normals to unit length; any unit vectors stand in for those of a volume."""
+    if isinstance(surface, Mesh):
+        return unit_normals(surface)
+    if surface.normals is None:
+        return np.tile(_UP.astype(surface.positions.dtype), (surface.num_points, 1))
+    return _at_unit_length(np.asarray(surface.normals), but=np.zeros(surface.num_points, bool))
+
+
+def _at_unit_length(
+    normals: Float[np.ndarray, "v 3"], but: Bool[np.ndarray, " v"]
+) -> Float[np.ndarray, "v 3"]:
     with np.errstate(invalid="ignore"):
         # Very long or short ones would leave the range of numbers when squared. By columns, which
         # takes NumPy a fraction of the time of reductions over three.
@@ -72,7 +97,7 @@ def unit_normals(mesh: Mesh) -> Float[np.ndarray, "v 3"]:
         largest = np.maximum(np.maximum(x, y), z)[:, None]
         normals = np.ldexp(normals, -np.frexp(largest)[1])
         length = _lengths(normals.T)[:, None]
-    defined = np.isfinite(length) & (length > 0) & ~_cancelled(mesh)[:, None]
+    defined = np.isfinite(length) & (length > 0) & ~but[:, None]
     return np.where(defined, normals / np.where(defined, length, 1), 0).astype(normals.dtype)
 
 

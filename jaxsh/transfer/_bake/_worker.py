@@ -13,11 +13,12 @@ from jaxtyping import Float
 
 from .._store import DamagedError
 from ._gather import TILE
-from ._kept import BakeStore
+from ._job import DIRECT
+from ._kept import BakeStore, differing
 
 
 class Task(NamedTuple):
-    """Bakes a block on a worker, and tells which of its vertices see nothing."""
+    """Bakes a block on a worker, and tells which of its points see nothing."""
 
     path: str
     identity: dict[str, Any]
@@ -26,14 +27,16 @@ class Task(NamedTuple):
 
     def __call__(self, block: int) -> bytes | None:
         held = _hold(self.path, self.identity)
-        kept, part = held.kept, held.kept.rows(block)
+        kept, part = held.kept, held.kept.rows_of_pass(self.number, block)
         try:
             rows = kept.read_pass(self.number, block)
         except DamagedError:
             rows = held.bake(self.number, block, self.chunk)
             kept.write_pass(self.number, block, rows)
-        blind = ~rows.any(axis=1) & held.job.prepared.normals[part].any(axis=1)
-        return np.packbits(blind).tobytes() if self.number == 0 and blind.any() else None
+        if kept.steps[self.number] != DIRECT:
+            return None
+        blind = ~rows.any(axis=1) & held.jobs.points.prepared.normals[part].any(axis=1)
+        return np.packbits(blind).tobytes() if blind.any() else None
 
 
 class _Held:
@@ -46,35 +49,36 @@ class _Held:
                 "folder that this process and all workers see under one path"
             )
         self.kept = BakeStore(Path(path))
-        if self.kept.attributes["arguments"] != identity:
+        if differing(self.kept.attributes["arguments"], identity):
             raise ValueError(f"{path}: another bake took the place of this one's store")
-        self.job = self.kept.job(threads=1)
-        # All vertices' coefficients before the bounces of pass `_number`.
-        self._before, self._number = np.empty((0, self.job.width), self.job.dtype), 0
+        self.jobs = self.kept.jobs(threads=1)
+        # The coefficients of pass `_number`, of all vertices that light bounces off.
+        self._before, self._number = np.empty((0, 0)), -1
         self._lock = threading.Lock()
         _keep_freed_memory()
 
     def bake(self, number: int, block: int, chunk: int) -> Float[np.ndarray, "rows k"]:
         """Compute a block of a pass, `chunk` vertices at a time."""
-        before, direct = None, None
-        if number:
-            before, direct = self._all_before(number), self.kept.read_pass(0, block)
-        part = self.kept.rows(block)
-        rows = np.empty((part.stop - part.start, self.job.width), self.job.dtype)
+        before, direct, step, job = None, None, self.kept.steps[number], self.jobs.of(number)
+        if step.before is not None and step.direct is not None:
+            before, direct = self._all_of(step.before), self.kept.read_pass(step.direct, block)
+        part = self.kept.rows_of_pass(number, block)
+        rows = np.empty((part.stop - part.start, job.width), job.dtype)
         # A device has chunks of its own.
-        size = max(len(rows), 1) if self.job.arguments.device else -(-chunk // TILE) * TILE
+        size = max(len(rows), 1) if job.arguments.device else -(-chunk // TILE) * TILE
         for start in range(0, len(rows), size):
             at = slice(start, min(start + size, len(rows)))
             whole = slice(part.start + at.start, part.start + at.stop)
-            rows[at] = self.job.rows(number, whole, before, None if direct is None else direct[at])
+            own = None if direct is None else direct[at]
+            rows[at] = self.jobs.rows(number, whole, before, own)
         return rows
 
-    def _all_before(self, number: int) -> Float[np.ndarray, "v k"]:
-        """Read the pass before, once for all threads."""
+    def _all_of(self, number: int) -> Float[np.ndarray, "v k"]:
+        """Read a pass, once for all threads."""
         with self._lock:
             if self._number != number:
                 self._before = self._before[:0].copy()  # its memory first
-                self._before, self._number = self.kept.whole_pass(number - 1), number
+                self._before, self._number = self.kept.whole_pass(number), number
             return self._before
 
 
