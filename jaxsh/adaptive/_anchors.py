@@ -18,12 +18,12 @@ from ..transfer import (
     sample,
     shade_diffuse,
 )
-from ..transfer._glossy_kernels import lobe_polynomial, lobe_products, mirrored
+from ..transfer._glossy_kernels import lobe_polynomial, lobe_products, mirrored, reflection
 from ._method import (
     AbstractMethod,
     check_known,
     check_one_device,
-    check_one_exponent,
+    check_one_lobe,
     check_set,
     check_whole_degree,
     checked_frame,
@@ -97,7 +97,7 @@ class AnchorSet(eqx.Module):
         **Arguments**
 
         - `light`, `eye`, `material`, `distant`, `normalized`: as for `transfer.shade_glossy`; one
-          light (3, K) of the transfer's degree, and one exponent.
+          light (3, K) of the transfer's degree, and one exponent or roughness.
         - `threshold`: of max - min over the four anchors, the largest channel, after the albedo
           and times `exposure`. At 0 every vertex is computed in full, exactly.
 
@@ -105,11 +105,12 @@ class AnchorSet(eqx.Module):
         computed in full as an anchor and as a vertex. Differentiable in light and albedos where
         the choice of vertices does not change, forward and reverse; the choice is a constant.
 
-        Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
+        Raises `ValueError` for shapes that do not fit, and for an exponent or roughness
+        per vertex.
         """
         light, eye, material = checked_frame(light, self.diffuse, eye, material)
         check_whole_degree("anchors", light, self.degree)
-        check_one_exponent(material, self.num_points)
+        check_one_lobe(material, self.num_points)
         check_one_device("An AnchorSet", self.rows.samples)
         distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
         limits = scalars(light.dtype, threshold=threshold, exposure=exposure)
@@ -241,12 +242,16 @@ class Anchors(AbstractMethod):
 def _shade_anchors(light, eye, material, anchors, limits, distant, normalized):
     threshold, exposure = limits
     axis = mirrored(eye, anchors.base.positions, anchors.base.normals, distant)
-    polynomial = lobe_polynomial(material.exponent, anchors.degree, normalized)
+    see = functools.partial(
+        reflection, material, axis, anchors.base.normal_rows(), normalized=normalized
+    )
+    zonal, albedo = see(anchors.degree)
+    polynomial = lobe_polynomial(zonal)
 
     def in_full(vertices):
         return row_products(light, anchors.rows, axis, polynomial, vertices)
 
-    base_polynomial = lobe_polynomial(material.exponent, anchors.base.degree, normalized)
+    base_polynomial = lobe_polynomial(see(anchors.base.degree)[0])
     width = (anchors.base.degree + 1) ** 2
     base = lobe_products(light[:, :width], anchors.base, axis, base_polynomial)
 
@@ -256,13 +261,12 @@ def _shade_anchors(light, eye, material, anchors, limits, distant, normalized):
     at_anchors = everywhere(some_anchors, len(anchors.anchors))
     rest = at_anchors - base[:, anchors.anchors]
     spread, carried = materialize(_between, rest, anchors.nearest, anchors.weights, base)
-    albedo = material.specular
     specular = albedo.T if albedo.ndim == 2 else albedo.reshape(-1, 1)
     active = materialize(seen_as_changed, spread, threshold, specular * exposure)
     glossy = jnp.where(active[None], compacted(in_full, active), carried).T
 
     diffuse = shade_diffuse(light, anchors.diffuse, material.diffuse)
-    color = diffuse + jnp.multiply(*align(glossy, material.specular))
+    color = diffuse + jnp.multiply(*align(glossy, albedo))
     shares = {
         "anchors": jnp.asarray(len(anchors.anchors) / len(active), light.dtype),
         "specular": jnp.mean(active.astype(light.dtype)),

@@ -39,11 +39,8 @@ def filtered_by_device(
         names = mesh.axis_names
     rows, whole = PartitionSpec(names), PartitionSpec()
 
-    # An albedo or exponent of each vertex has one more axis than one that all share.
-    each = material.diffuse.ndim == 2, material.specular.ndim == 2, material.exponent.ndim == 1
-    leaves, structure = jax.tree.flatten(material)
-    lobes = [rows if own else whole for own, _ in zip(each, leaves, strict=True)]
-    lobes = jax.tree.unflatten(structure, lobes)
+    lobes = [rows if own else whole for own in material.per_vertex]
+    lobes = jax.tree.unflatten(jax.tree.structure(material), lobes)
 
     def one(*arguments):
         result = filtered(*arguments, compact=True)

@@ -10,9 +10,9 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._core.linalg import shading_tall_product, shading_tensordot
 from .._core.xla import on_mesh
-from ..harmonics import convolve, degree_of, evaluate, num_coefficients, phong, product_matrix
+from ..harmonics import convolve, degree_of, evaluate, num_coefficients, product_matrix
 from ..transfer import Material, Transfer
-from ..transfer._glossy_kernels import reflected
+from ..transfer._glossy_kernels import reflected, reflection
 from ._regions import Region, compacted, decide, everywhere, grow, seen_as_changed, smooth
 from ._result import AdaptiveResult, product_cost
 
@@ -63,18 +63,19 @@ def _take(table, rows, count: int) -> Float[Array, "few n"]:
     return table.at[rows, :count].get(mode="promise_in_bounds").T
 
 
-def _products(light, transfer: Transfer, eye, exponent, options: Filter) -> Products:
+def _products(light, transfer: Transfer, eye, material, options: Filter):
     degree = degree_of(light.shape[-1])
     axis = reflected(eye, transfer.positions, transfer.normals, options.distant)
+    normals = transfer.normal_rows()
+    zonal, specular = reflection(material, axis, normals, degree, options.normalized)
 
     def kernel(rows):
         if rows is None:
-            return lobe_kernel(axis, exponent, degree, options.normalized)
-        own = exponent[rows] if exponent.ndim else exponent
-        return lobe_kernel(axis[:, rows], own, degree, options.normalized)
+            return lobe_kernel(axis, zonal)
+        return lobe_kernel(axis[:, rows], zonal[rows] if zonal.ndim == 2 else zonal)
 
     kernels = everywhere(kernel, transfer.num_points, whole=on_mesh(axis)).T
-    return Products(light, product_matrix(light), transfer.coefficients, kernels)
+    return Products(light, product_matrix(light), transfer.coefficients, kernels), specular
 
 
 @functools.partial(jax.jit, static_argnames="compact")
@@ -88,10 +89,10 @@ def filtered(
     compact: bool,
 ) -> AdaptiveResult:
     """Runs algorithm 1 for the diffuse and the specular part, refined and smoothed."""
-    products = _products(light, transfer, eye, material.exponent, options)
+    products, specular = _products(light, transfer, eye, material, options)
     color, cost = jnp.zeros((3, transfer.num_points), light.dtype), 0.0
     fractions, degrees = {}, {}
-    for kind, albedo in albedos(material, transfer.num_points).items():
+    for kind, albedo in albedos(material.diffuse, specular, transfer.num_points).items():
         shown, region, work = _one(kind, albedo, products, transfer, options, previous, compact)
         color = color + albedo * shown
         fractions[kind], degrees[kind] = region.fractions, region.degree
@@ -160,23 +161,20 @@ def threshold(kind, level, options: Filter, previous, count) -> Float[Array, " v
     return jnp.where(previous[kind] >= level, options.hysteresis * limit, limit)
 
 
-def albedos(material: Material, count: int) -> dict[str, Float[Array, "3 v"]]:
+def albedos(
+    diffuse: Float[Array, "..."], specular: Float[Array, "..."], count: int
+) -> dict[str, Float[Array, "3 v"]]:
     def columns(albedo):
         rows = albedo if albedo.ndim == 2 else jnp.broadcast_to(albedo, (3,))[None]
         return jnp.broadcast_to(rows, (count, 3)).T
 
-    return {
-        "diffuse": columns(material.diffuse) / math.pi,
-        "specular": columns(material.specular),
-    }
+    return {"diffuse": columns(diffuse) / math.pi, "specular": columns(specular)}
 
 
-def lobe_kernel(
-    axis: Float[Array, "3 n"], exponent: Float[Array, "..."], degree: int, normalized: bool
-) -> Float[Array, "k n"]:
+def lobe_kernel(axis: Float[Array, "3 n"], zonal: Float[Array, "*n bands"]) -> Float[Array, "k n"]:
     """Computes α_i y_i(B)."""
-    ones = jnp.ones(num_coefficients(degree), axis.dtype)
-    alpha = convolve(ones, phong(exponent, degree, normalized=normalized))
+    degree = zonal.shape[-1] - 1
+    alpha = convolve(jnp.ones(num_coefficients(degree), axis.dtype), zonal)
     basis = evaluate(axis.T, degree, axis=0)
     return basis * (alpha[:, None] if alpha.ndim == 1 else alpha.T)
 

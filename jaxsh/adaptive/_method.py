@@ -74,10 +74,22 @@ def check_whole_degree(kind: str, light: Array, degree: int) -> None:
         )
 
 
-def check_one_exponent(material: Material, count: int) -> None:
+def check_one_lobe(material: Material, count: int) -> None:
     check_type("material", material, Material)
-    if material.exponent.ndim:
-        raise ValueError(f"expected one exponent, got one for each of {count} vertices")
+    name, lobe = material.lobe
+    if lobe.ndim:
+        raise ValueError(f"expected one {name}, got one for each of {count} vertices")
+
+
+def one_exponent(material: Material, count: int) -> Float[Array, ""]:
+    check_one_lobe(material, count)
+    if material.exponent is None:
+        raise ValueError(
+            "expected a material with an exponent, got a roughness: tiles take the same lobe at "
+            "every vertex, but GGX's changes with the angle of view; take transfer.shade_glossy, "
+            "fixed_view, fixed_light or another method"
+        )
+    return material.exponent
 
 
 def checked_scalar(name: str, value: ArrayLike) -> Float[Array, ""]:

@@ -27,9 +27,9 @@ from ._method import (
     AbstractMethod,
     check_known,
     check_one_device,
-    check_one_exponent,
     check_set,
     check_whole_degree,
+    one_exponent,
     plain_transfer,
 )
 from ._result import AdaptiveResult, full_cost, product_cost, sum_cost
@@ -113,13 +113,14 @@ class TileSet(eqx.Module):
         and differentiable in them, in the eye and in the exponent, forward and reverse; the
         transfer's glossy part is a constant.
 
-        Raises `ValueError` for shapes that do not fit, and for an exponent per vertex.
+        Raises `ValueError` for shapes that do not fit, for an exponent per vertex, and for a
+        roughness, whose lobe changes with the angle of view.
         """
         count, dtype = self.num_points, self.basis.dtype
         light = checked_one_light(light, count, self.degree, dtype)
         check_whole_degree("tiles", light, self.degree)
         eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
-        check_one_exponent(material, count)
+        one_exponent(material, count)
         check_one_device("A TileSet", self.samples)
         distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
         return _shade_tiles(light, eye, material, self, distant, normalized)
@@ -307,9 +308,10 @@ class Tiles(AbstractMethod):
         tiles = self.tiles
         if tiles is None:
             check_type("transfer", transfer, AbstractTransfer)
-            check_one_exponent(material, transfer.num_points)
+            check_type("material", material, Material)
+            given = one_exponent(material, transfer.num_points)
             check_known("Tiles without a tile set", transfer, eye, material)
-            exponent = float(material.exponent) if self.exponent is None else self.exponent
+            exponent = float(given) if self.exponent is None else self.exponent
             tiles = make_tiles(
                 plain_transfer("tiles", transfer),
                 eye,
@@ -333,7 +335,7 @@ def _shade_tiles(light, eye, material, tiles, distant, normalized):
     weights = jnp.swapaxes(lights, 0, 1)[tile] * tiles.scales[:, None]
 
     axis = mirrored(eye, tiles.positions, tiles.normals, distant).reshape(3, blocks, 1, size)
-    zonal = phong(material.exponent, tiles.degree, normalized=normalized)
+    zonal = phong(one_exponent(material, count), tiles.degree, normalized=normalized)
     lobe = matmul(tiles.powers, zonal)
     values = materialize(_lobed, axis, tiles.directions[tile], lobe, tiles.lowest, tiles.samples)
     glossy = materialize(block_sums, weights, values)

@@ -1,5 +1,7 @@
 """One decision at a middle degree, then all or nothing."""
 
+import functools
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,7 +11,7 @@ from .._core.checks import check_degree
 from .._core.xla import materialize
 from ..harmonics import degree_of, num_coefficients
 from ..transfer import AbstractTransfer, Material, SampledTransfer
-from ..transfer._glossy_kernels import lobe_polynomial, lobe_products, mirrored
+from ..transfer._glossy_kernels import lobe_polynomial, lobe_products, mirrored, reflection
 from ._filter import Filter, albedos, threshold
 from ._levels import AbstractFilter
 from ._method import check_one_device, checked_frame, plain_transfer
@@ -90,10 +92,12 @@ def _two_stage(light, staged, eye, material, settings: Filter, previous):
     transfer, (base, middle, target) = staged.transfer, staged.degrees
     count = staged.num_points
     axis = mirrored(eye, staged.base.positions, staged.base.normals, settings.distant)
-    albedo = albedos(material, count)
+    normals = staged.base.normal_rows()
+    see = functools.partial(reflection, material, axis, normals, normalized=settings.normalized)
+    albedo = albedos(material.diffuse, see(target)[1], count)
 
     def lobes(degree):
-        return lobe_polynomial(material.exponent, degree, settings.normalized)
+        return lobe_polynomial(see(degree)[0])
 
     def everyone(sampled: SampledTransfer):
         lights = light[:, : num_coefficients(sampled.degree)]

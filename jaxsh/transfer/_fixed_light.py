@@ -11,8 +11,8 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import align, check_cosine, check_flag, check_type
 from .._core.linalg import matmul
 from .._core.xla import on_mesh
-from ..harmonics import convolve, degree_of, evaluate, num_coefficients, phong, product_matrix
-from ._glossy_kernels import mirrored, rows_of
+from ..harmonics import convolve, degree_of, evaluate, num_coefficients, product_matrix
+from ._glossy_kernels import mirrored, reflection, rows_of
 from ._material import Material, checked_eye, checked_material, checked_one_light
 from ._transfer import Transfer
 
@@ -112,10 +112,8 @@ def _fixed_light(light, transfer):
 def _shade(still, eye, material, distant, normalized):
     axis = mirrored(eye, still.positions, still.normals, distant)
     degree, (*_, size) = still.degree, still.radiance.shape
-    lobes = convolve(
-        jnp.ones(num_coefficients(degree), axis.dtype),
-        phong(material.exponent, degree, normalized=normalized),
-    )
+    zonal, specular = reflection(material, axis, still.normals, degree, normalized)
+    lobes = convolve(jnp.ones(num_coefficients(degree), axis.dtype), zonal)
 
     def tile(radiance, axis, *own):
         # Σ_i α_i y_i(B) R_i
@@ -127,7 +125,7 @@ def _shade(still, eye, material, distant, normalized):
         parts = *parts, _in_tiles(lobes.T, size)
     glossy = _out_of_tiles(_over_tiles(tile, *parts), axis.shape[-1]).T
     diffuse = jnp.multiply(*align(still.irradiance, material.diffuse / math.pi))
-    return diffuse + jnp.multiply(*align(glossy, material.specular))
+    return diffuse + jnp.multiply(*align(glossy, specular))
 
 
 def _over_tiles(tile, *parts):

@@ -11,7 +11,7 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import as_finite, check_cosine, check_flag, check_type
 from .._core.linalg import in_full, shading_tall_product
 from ..harmonics import degree_of, num_coefficients
-from ._glossy_kernels import lobe_polynomial, lobe_products
+from ._glossy_kernels import lobe_polynomial, lobe_products, reflection
 from ._material import Material, checked_eye, checked_material
 from ._transfer import Transfer, checked_degree
 
@@ -105,12 +105,12 @@ def fixed_view(
 @functools.partial(jax.jit, static_argnames=("degree", "distant", "normalized"))
 def _fixed_view(transfer, eye, material, degree, distant, normalized):
     axis = transfer.reflections(eye, distant)
-    lobes = lobe_polynomial(material.exponent, degree, normalized)
+    zonal, specular = reflection(material, axis, transfer.normal_rows(), degree, normalized)
     unit_lights = jnp.eye(num_coefficients(degree), dtype=axis.dtype)
-    glossy = lobe_products(unit_lights, transfer, axis, lobes)
+    glossy = lobe_products(unit_lights, transfer, axis, lobe_polynomial(zonal))
     diffuse = transfer.vectors(len(unit_lights))[:, None]
     coefficients = _column(material.diffuse / math.pi) * diffuse
-    coefficients += _column(material.specular) * glossy.T[:, None]
+    coefficients += _column(specular) * glossy.T[:, None]
     return coefficients[:, 0] if coefficients.shape[1] == 1 else coefficients
 
 

@@ -88,6 +88,10 @@ class SampledTransfer(AbstractTransfer):
         """Mirror the direction towards the eye about each normal, components first."""
         return mirrored(eye, self.positions, self.normals, distant)
 
+    def normal_rows(self) -> Float[Array, "3 v"]:
+        """Return the normals, components first."""
+        return self.normals
+
     def node_passes(self, degree: int) -> Float[Array, "p n v"]:
         """Return what `at_nodes` takes of each pass of nodes."""
         return self.samples

@@ -4,7 +4,7 @@ The one private file that other modules may import from: `adaptive` builds on th
 """
 
 import functools
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import jax
 import jax.numpy as jnp
@@ -16,15 +16,17 @@ from .._core.host import read_only_cache
 from .._core.linalg import matmul, shading_matmul, tensordot
 from .._core.vectors import normalize
 from .._core.xla import materialize, on_mesh, rows_at_once, rows_on_each
-from ..harmonics import degree_of, legendre, orders, phong
-from ..harmonics._tables import exact_grid
+from ..harmonics import degree_of, phong
+from ._ggx import ggx_lobe
 from ._material import (
+    Material,
     checked_albedo,
     checked_eye,
     checked_light,
     checked_material,
     checked_one_light,
 )
+from ._nodes import node_passes, product_nodes
 
 __all__ = [
     "AtNodes",
@@ -43,6 +45,7 @@ __all__ = [
     "node_passes",
     "product_nodes",
     "reflected",
+    "reflection",
     "rows_of",
     "unit",
 ]
@@ -108,16 +111,38 @@ def _inverse_length(x, y, z):
     return scale * jnp.sqrt(1 / jnp.where(defined, x * x + y * y + z * z, 1.0))
 
 
-def lobe_polynomial(
-    exponent: Float[Array, "*v"], degree: int, normalized: bool
-) -> Float[Array, "bands ..."]:
-    """Expands a Phong lobe, cut to a degree, as a polynomial of t = cos θ.
+def reflection(
+    material: Material,
+    axis: Float[Array, "3 v"],
+    normals: Float[Array, "3 v"],
+    degree: int,
+    normalized: bool,
+) -> tuple[Float[Array, "*v bands"], Float[Array, "..."]]:
+    """Computes the lobe's zonal coefficients, and the albedo that it is multiplied with.
+
+    Those of Phong's lobe are the material's own. A GGX lobe has one for each vertex, by the angle
+    between its normal, of any length, and the axis, the mirrored direction towards the eye.
+    """
+    if material.exponent is not None:
+        return phong(material.exponent, degree, normalized=normalized), material.specular
+    assert material.roughness is not None
+    if not normalized:
+        raise ValueError(
+            "expected normalized=True with a roughness: it is Phong's lobe that has a bare power"
+        )
+    # An eye behind the surface sees nothing: what it would see is said for one at the horizon.
+    cosine = jnp.clip(jnp.sum(axis * unit(normals), axis=0), 0, 1)
+    return ggx_lobe(material.roughness, material.specular, cosine, degree)
+
+
+def lobe_polynomial(zonal: Float[Array, "*v bands"]) -> Float[Array, "bands ..."]:
+    """Writes a lobe, given by its zonal coefficients g_l, as a polynomial of t = cos θ.
 
     Σ_l g_l y_l0(t) = E(t² - ½) + t O(t² - ½). Those of E come first, ascending. Around the middle
     of [0, 1] they stay small, where powers of t alone would cancel each other.
     """
-    zonal = jnp.moveaxis(phong(exponent, degree, normalized=normalized), -1, 0)
-    return tensordot(jnp.asarray(_powers(degree), zonal.dtype), zonal)
+    degree = zonal.shape[-1] - 1
+    return tensordot(jnp.asarray(_powers(degree), zonal.dtype), jnp.moveaxis(zonal, -1, 0))
 
 
 def lobe(t: Float[Array, "..."], polynomial: Float[Array, "bands ..."]) -> Float[Array, "..."]:
@@ -153,66 +178,6 @@ def _powers(degree: int) -> Float[np.ndarray, "bands bands"]:
         norm = np.sqrt((2 * l + 1) / (4 * np.pi))
         matrix[start : start + len(p.coef), l] = norm * p.coef
     return matrix
-
-
-# Algebraic degrees for which Lebedev's rules are known.
-_LEBEDEV = (*range(3, 33, 2), *range(35, 132, 6))
-# Nodes of a pass on the CPU: their values for 50,000 vertices stay in the last cache.
-_PASS = 35
-
-
-class Nodes(NamedTuple):
-    """Holds N directions, the basis there and its weighted transpose, in float64 on the host."""
-
-    directions: Float[np.ndarray, "n 3"]
-    basis: Float[np.ndarray, "n k"]
-    project: Float[np.ndarray, "k n"]
-
-
-@read_only_cache(maxsize=16)
-def product_nodes(degree: int) -> Nodes:
-    """Returns directions and weights exact for any product of three functions of this degree.
-
-    Lebedev's rules need a third fewer nodes than Gauss and Legendre's: 350 instead of 496 at
-    degree 10, for K = 121 coefficients.
-    """
-    from scipy.integrate import lebedev_rule
-
-    order = next((order for order in _LEBEDEV if order >= 3 * degree), None)
-    if order is None:
-        grid = exact_grid(3 * degree, degree)
-        return Nodes(grid.directions, grid.basis.T, grid.basis * grid.weights)
-    directions, weights = lebedev_rule(order)
-    x, y, z = directions
-    m, phi = orders(degree)[:, None], np.arctan2(y, x)
-    azimuth = np.where(m < 0, np.sin(-m * phi), np.cos(m * phi))
-    basis = legendre(np.clip(z, -1, 1), degree) * azimuth
-    return Nodes(directions.T, basis.T, basis * weights)
-
-
-class NodePasses(NamedTuple):
-    """Holds nodes in P passes of N, the last one filled up with directions of no weight."""
-
-    directions: Float[np.ndarray, "p n 3"]
-    basis: Float[np.ndarray, "p n k"]
-    project: Float[np.ndarray, "p k n"]
-
-
-@read_only_cache(maxsize=16)
-def node_passes(degree: int) -> NodePasses:
-    """Cuts `product_nodes` into passes of some tens."""
-    nodes = product_nodes(degree)
-    passes = -(-len(nodes.directions) // _PASS)
-    size = -(-len(nodes.directions) // passes)
-    spare = passes * size - len(nodes.directions)
-    directions = np.pad(nodes.directions, ((0, spare), (0, 0)), mode="edge")
-    basis = np.pad(nodes.basis, ((0, spare), (0, 0)), mode="edge")
-    project = np.pad(nodes.project, ((0, 0), (0, spare)))
-    return NodePasses(
-        directions.reshape(passes, size, 3),
-        basis.reshape(passes, size, -1),
-        np.moveaxis(project.reshape(-1, passes, size), 0, 1),
-    )
 
 
 @runtime_checkable

@@ -1,6 +1,7 @@
 """Surface materials, and the argument checks that all shading shares, made before tracing."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
@@ -20,17 +21,25 @@ def _as_strong(name: str, least: float | None):
     return convert
 
 
+def _as_lobe(name: str):
+    convert = _as_strong(name, None)
+    return lambda value: None if value is None else convert(value)
+
+
 class Material(eqx.Module):
-    """Holds how a surface of V vertices reflects light: diffusely, and through a Phong lobe.
+    """Holds how a surface of V vertices or other points reflects: diffusely, and through a lobe.
 
-    `diffuse` and `specular` are albedos: a number, RGB (3,), or per vertex (V, 1) or (V, 3).
-    `exponent` is that of the glossy lobe, a number or (V,). Differentiable in all three.
+    `diffuse` and `specular` are albedos: a number, RGB (3,), or per vertex (V, 1) or (V, 3). The
+    lobe is Phong's with an `exponent`, or that of GGX with a `roughness`, each a number or (V,).
+    Differentiable in all of them.
 
-    The lobe integrates to one over the sphere, as in Lee & Kim, so that with the cosine less than
-    `specular` of uniform light is reflected: `modified_phong` takes the share itself.
+    Phong's lobe integrates to one over the sphere, as in Lee & Kim, so that with the cosine less
+    than `specular` of uniform light is reflected: `modified_phong` takes the share itself. For the
+    other see `ggx`.
 
-    Raises `ValueError` for other shapes, and where values are known and an albedo is not finite
-    and >= 0, or an exponent not finite and above -1.
+    Raises `ValueError` for other shapes, unless there is either an exponent or a roughness, and
+    where values are known and an albedo is not finite and >= 0, an exponent not finite and above
+    -1, a roughness not from 0 to 1, or `specular` above 1 beside a roughness.
 
     **Example**
 
@@ -44,7 +53,8 @@ class Material(eqx.Module):
 
     diffuse: Float[Array, "..."] = eqx.field(converter=_as_strong("diffuse", 0.0))
     specular: Float[Array, "..."] = eqx.field(converter=_as_strong("specular", 0.0))
-    exponent: Float[Array, "..."] = eqx.field(converter=_as_strong("exponent", None))
+    exponent: Float[Array, "..."] | None = eqx.field(default=None, converter=_as_lobe("exponent"))
+    roughness: Float[Array, "..."] | None = eqx.field(default=None, converter=_as_lobe("roughness"))
 
     def __check_init__(self):
         for name in ("diffuse", "specular"):
@@ -55,23 +65,88 @@ class Material(eqx.Module):
                 raise ValueError(
                     f"expected {name} as a number, (3,), (V, 1) or (V, 3), got shape {array.shape}"
                 )
-        if self.exponent.ndim > 1:
+        if (self.exponent is None) == (self.roughness is None):
             raise ValueError(
-                f"expected exponent as a number or (V,), got shape {self.exponent.shape}"
+                "expected an exponent, of Phong's lobe, or a roughness, of GGX's, got "
+                f"{'neither' if self.exponent is None else 'both'}"
             )
-        if is_concrete(self.exponent) and not (np.asarray(self.exponent) > -1).all():
-            raise ValueError("exponent must be finite and above -1 everywhere")
+        name, lobe = self.lobe
+        if lobe.ndim > 1:
+            raise ValueError(f"expected {name} as a number or (V,), got shape {lobe.shape}")
+        if is_concrete(lobe):
+            known = np.asarray(lobe)
+            if name == "exponent" and not (known > -1).all():
+                raise ValueError("exponent must be finite and above -1 everywhere")
+            if name == "roughness" and not ((known >= 0) & (known <= 1)).all():
+                raise ValueError(f"expected roughness from 0 to 1, got {_worst(known):g}")
+        if name == "roughness" and is_concrete(self.specular):
+            most = np.asarray(self.specular).max(initial=0)
+            if most > 1:
+                raise ValueError(
+                    "expected specular of at most 1 beside a roughness, as the share that is "
+                    f"reflected along the normal, got {most:g}"
+                )
         counts = {
             name: len(array)
-            for name, array, ndim in (
-                ("diffuse", self.diffuse, 2),
-                ("specular", self.specular, 2),
-                ("exponent", self.exponent, 1),
+            for name, array, each in zip(
+                ("diffuse", "specular", name),
+                (self.diffuse, self.specular, lobe),
+                self.per_vertex,
+                strict=True,
             )
-            if array.ndim == ndim
+            if each
         }
         if len(set(counts.values())) > 1:
             raise ValueError(f"a material is of one mesh, but its numbers of vertices are {counts}")
+
+    @property
+    def lobe(self) -> tuple[str, Float[Array, "..."]]:
+        """Names the lobe's parameter, "exponent" or "roughness", and gives its value."""
+        if self.exponent is not None:
+            return "exponent", self.exponent
+        assert self.roughness is not None
+        return "roughness", self.roughness
+
+    @property
+    def per_vertex(self) -> tuple[bool, bool, bool]:
+        """Says of diffuse albedo, specular albedo and lobe if each vertex has its own."""
+        return self.diffuse.ndim == 2, self.specular.ndim == 2, self.lobe[1].ndim == 1
+
+    @classmethod
+    def ggx(
+        cls,
+        diffuse: Float[ArrayLike, "..."],
+        specular: Float[ArrayLike, "..."],
+        roughness: Float[ArrayLike, "..."],
+    ) -> "Material":
+        """Make a rough metal or dielectric: its lobe is the nearest to GGX at each angle of view.
+
+        What it stands for is D F G / (4 (n·ω) (n·ω_o)), of Walter et al. 2007, "Microfacet models
+        for refraction through rough surfaces", with α = `roughness`², as in glTF, Smith's masking
+        and shadowing, and Schlick's Fresnel term. `specular` is the reflectance along the normal:
+        a metal's color, or 0.04 for a dielectric of index 1.5. For a metal `diffuse` is 0.
+
+        Glossy shading takes a lobe around the mirrored direction. This one is fitted, least
+        squares at the light's degree, for each roughness and angle of view. It reflects of uniform
+        light what GGX does, to 1 %; its shape is off by what `docs/glossy.md` says. Arguments of V
+        vertices or texels, as for `Material`; differentiable in each, and through the angle in eye
+        and normals. The table of a degree is fitted at its first use, which takes about a second
+        at degree 10.
+
+        Raises `ValueError` as `Material` does.
+
+        **Example**
+
+        >>> import jax.numpy as jnp
+        >>> from jaxsh import transfer
+        >>> up = jnp.asarray([[0.0, 0.0, 1.0]])
+        >>> gold = transfer.Material.ggx(0.0, jnp.asarray([1.0, 0.78, 0.34]), roughness=0.3)
+        >>> sky = jnp.zeros((3, 9)).at[:, 0].set((4 * jnp.pi) ** 0.5)  # radiance 1 from everywhere
+        >>> color = transfer.shade_glossy(sky, transfer.unshadowed(up, up, 2), 5 * up[0], gold)
+        >>> [round(float(channel), 2) for channel in color[0]]
+        [0.99, 0.78, 0.34]
+        """
+        return cls(diffuse, specular, roughness=roughness)
 
     @classmethod
     def modified_phong(
@@ -94,8 +169,9 @@ class Material(eqx.Module):
         0.36
         """
         made = cls(diffuse, specular, exponent)
-        dtype = jnp.promote_types(made.specular.dtype, made.exponent.dtype)
-        exponents = made.exponent.astype(dtype)
+        _, exponents = made.lobe
+        dtype = jnp.promote_types(made.specular.dtype, exponents.dtype)
+        exponents = exponents.astype(dtype)
         factor = (exponents + 2) / (exponents + 1)
         if factor.ndim:
             factor = factor[:, None]
@@ -111,12 +187,16 @@ class Material(eqx.Module):
         """
         check_known("material", self)
         mesh = mesh_of(devices)
-        exponent = (share if self.exponent.ndim else whole)(self.exponent, mesh)
-        diffuse, specular = (
-            (share if albedo.ndim == 2 else whole)(albedo, mesh)
-            for albedo in (self.diffuse, self.specular)
+        arrays, structure = jax.tree.flatten(self)
+        shared = (
+            (share if each else whole)(array, mesh)
+            for array, each in zip(arrays, self.per_vertex, strict=True)
         )
-        return Material(diffuse, specular, exponent)
+        return jax.tree.unflatten(structure, shared)
+
+
+def _worst(values: np.ndarray) -> float:
+    return values.flat[np.argmax(np.abs(values - 0.5))]
 
 
 def checked_light(
@@ -154,16 +234,16 @@ def checked_one_light(
 def checked_material(material: Material, count: int, dtype: jnp.dtype) -> Material:
     """Casts a material whose arrays per vertex are of `count` vertices."""
     check_type("material", material, Material)
-    for name, ndim in (("diffuse", 2), ("specular", 2), ("exponent", 1)):
-        array = getattr(material, name)
-        if array.ndim == ndim and len(array) != count:
+    names = "diffuse", "specular", material.lobe[0]
+    for name, each in zip(names, material.per_vertex, strict=True):
+        if each and len(getattr(material, name)) != count:
             raise ValueError(
-                f"expected a material of {count} vertices, but its {name} is of {len(array)}"
+                f"expected a material of {count} vertices, but its {name} is of "
+                f"{len(getattr(material, name))}"
             )
-    arrays = (material.diffuse, material.specular, material.exponent)
-    if all(array.dtype == dtype for array in arrays):
+    if all(array.dtype == dtype for array in jax.tree.leaves(material)):
         return material
-    return Material(*(array.astype(dtype) for array in arrays))
+    return jax.tree.map(lambda array: array.astype(dtype), material)
 
 
 def checked_albedo(

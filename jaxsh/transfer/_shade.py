@@ -12,7 +12,7 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import align, as_float, check_cosine, check_flag, check_type
 from ..harmonics import degree_of
 from ._fluence import received
-from ._glossy_kernels import lobe_polynomial, lobe_products, reflected
+from ._glossy_kernels import lobe_polynomial, lobe_products, reflected, reflection
 from ._material import Material, checked_albedo, checked_eye, checked_light, checked_material
 from ._stored import StoredTransfer
 from ._streamed import streamed_diffuse, streamed_glossy
@@ -125,9 +125,9 @@ def shade_glossy(
       but the product with it. A `StoredTransfer` is read block by block, the next while one is
       shaded.
     - `eye`: a point, or with `distant` the direction, of any length, to an eye far away.
-    - `material`: albedos and the lobe's exponent. The lobe is cut to the light's degree.
-    - `normalized`: whether the lobe max(0, B·ω)^k is divided by its integral 2π/(k+1). Otherwise
-      the bare power, as in the paper.
+    - `material`: albedos and lobe, Phong's or GGX's, which is cut to the light's degree.
+    - `normalized`: whether Phong's lobe max(0, B·ω)^k is divided by its integral 2π/(k+1).
+      Otherwise the bare power, as in the paper.
 
     The cosine of the transfer stays inside the integral, as in the paper, so the glossy part of a
     normalized lobe is less than the albedo times the mean of light over the lobe: for light of
@@ -171,10 +171,11 @@ def shade_glossy(
 @functools.partial(jax.jit, static_argnames=("distant", "normalized"))
 def _shade_glossy(light, transfer, eye, material, distant, normalized):
     axis = transfer.reflections(eye, distant)
-    lobes = lobe_polynomial(material.exponent, degree_of(light.shape[-1]), normalized)
-    glossy, irradiance = _gather(light, transfer, axis, lobes)
+    degree = degree_of(light.shape[-1])
+    zonal, specular = reflection(material, axis, transfer.normal_rows(), degree, normalized)
+    glossy, irradiance = _gather(light, transfer, axis, lobe_polynomial(zonal))
     diffuse = jnp.multiply(*align(irradiance, material.diffuse / math.pi))
-    return diffuse + jnp.multiply(*align(glossy, material.specular))
+    return diffuse + jnp.multiply(*align(glossy, specular))
 
 
 def _gather(light, transfer, axis, lobes):

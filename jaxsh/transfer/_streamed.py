@@ -52,13 +52,14 @@ def streamed_glossy(
     lights, place = _on_host("light", light), _on_host("eye", eye)
     diffuse = _on_host("material", material.diffuse)
     specular = _on_host("material", material.specular)
-    exponent = _on_host("material", material.exponent)
+    name, lobe = material.lobe
+    lobe = _on_host("material", lobe)
 
     def of(rows: slice, block: Transfer) -> Array:
         own = Material(
             diffuse[rows] if diffuse.ndim == 2 else diffuse,
             specular[rows] if specular.ndim == 2 else specular,
-            exponent[rows] if exponent.ndim else exponent,
+            **{name: lobe[rows] if lobe.ndim else lobe},
         )
         return shade(_own(lights, rows), block, place, own)
 

@@ -109,6 +109,11 @@ def shade_sun(
     shadows, distant = check_flag("shadows", shadows), check_flag("distant", distant)
     normalized = check_flag("normalized", normalized)
     given = checked_material(_material(albedo, material, count, dtype), count, dtype)
+    if given.exponent is None:
+        raise ValueError(
+            "expected a material with an exponent, got a roughness: through a lobe of GGX light of "
+            "compact sources is not integrated; give shade_glossy suns.harmonics(degree)"
+        )
     eye = None if eye is None else checked_eye(eye, dtype)
     visibility = _visibility(suns, surface, scene, shadows, count)
     return _shade_sun(

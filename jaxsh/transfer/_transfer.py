@@ -215,6 +215,10 @@ class Transfer(AbstractTransfer):
         """Mirror the direction towards the eye about each normal, components first."""
         return reflected(eye, self.positions, self.normals, distant)
 
+    def normal_rows(self) -> Float[Array, "3 v"]:
+        """Return the normals, components first."""
+        return self.normals.T
+
     def node_passes(self, degree: int) -> Float[Array, "p n k"]:
         """Return what `at_nodes` takes of each pass of nodes."""
         return jnp.asarray(node_passes(degree).basis, self.dtype)

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from ..harmonics import phong
 from ..transfer import Material
 from ..transfer._glossy_kernels import lobe_polynomial, product_nodes
 
@@ -18,6 +19,11 @@ def split_material(albedo: Any) -> tuple[Float[ArrayLike, "..."], Material | Non
     """Split off the diffuse albedo; raises `ValueError` for gloss that differs by vertex."""
     if not isinstance(albedo, Material):
         return albedo, None
+    if albedo.exponent is None:
+        raise ValueError(
+            "expected a material with an exponent, got a roughness: the page takes the same lobe "
+            "at every vertex, but GGX's changes with the angle of view"
+        )
     if albedo.specular.ndim > 1 or albedo.exponent.ndim:
         raise ValueError(
             "expected a material with one specular albedo, a number or (3,), and one exponent, got "
@@ -37,9 +43,11 @@ def gloss_facts(material: Material, degree: int, count: int) -> dict[str, Any]:
             f"expected at most {_MOST_BYTES >> 20} MiB for gloss of degree {degree}, but {count} "
             f"points take {size >> 20} MiB; cut the light to a lower degree"
         )
+    assert material.exponent is not None  # `split_material` has said so
     own = float(material.exponent)
     exponents = sorted({*_EXPONENTS, own})
-    lobes = lobe_polynomial(jnp.asarray(exponents, jnp.result_type(float)), degree, True)
+    zonal = phong(jnp.asarray(exponents, jnp.result_type(float)), degree, normalized=True)
+    lobes = lobe_polynomial(zonal)
     weights = nodes.project[0] / nodes.basis[:, 0]
     return {
         "specular": np.broadcast_to(np.asarray(material.specular, np.float64), 3).tolist(),

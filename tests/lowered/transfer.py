@@ -48,6 +48,7 @@ def calls():
     def shining(suns, made, seen, eye, material):
         return t.shade_sun(suns, made, visibility(seen, suns), material=material, eye=eye)
 
+    rough = made_by(t.Material.ggx, albedo, floats(3), floats(V))
     discs = made_by(sphere.Suns, floats(16, 3), floats(16), floats(16, 3))
     return {
         "FixedLight.__call__": of(
@@ -74,6 +75,7 @@ def calls():
         "shade_glossy": of(t.shade_glossy, light, made, eye, material()),
         "shade_glossy, own lights": of(t.shade_glossy, own, made, eye, material()),
         "shade_glossy, sampled": of(t.shade_glossy, light, sampled, eye, material()),
+        "shade_glossy, rough": of(t.shade_glossy, light, made, eye, rough),
         "shade_sun": of(sunny, discs, made, booleans(V, 16, 16), albedo),
         "shade_sun.glossy": of(shining, suns(), made, booleans(V, 16, 16), eye, material()),
         "unshadowed": of(

@@ -36,6 +36,13 @@ def calls():
             exponent=floats(V),
             finite="diffuse specular exponent",
         ),
+        "Material.ggx": of(
+            t.Material.ggx,
+            diffuse=floats(V, 3),
+            specular=0.5,
+            roughness=floats(V),
+            finite="diffuse specular roughness",
+        ),
         "Transfer": of(
             t.Transfer,
             coefficients=floats(V, K),

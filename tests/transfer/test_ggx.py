@@ -1,0 +1,189 @@
+"""The GGX lobe: against the true BRDF, integrated over incoming directions on a fine grid."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxsh import adaptive, harmonics, sphere
+from jaxsh.transfer import (
+    Material,
+    fixed_light,
+    fixed_view,
+    sample,
+    shade_glossy,
+    shade_sun,
+    unshadowed,
+)
+
+DEGREE, EYE = 3, np.array([0.3, -4.0, 1.5])
+
+
+def brdf(incoming, eye, roughness, specular):
+    """D F G / 4 (n·ω)(n·ω_o), as Walter et al. 2007 and Heitz 2014 print its factors; n is z."""
+    square = roughness**4
+    halfway = incoming + eye
+    halfway = halfway / np.linalg.norm(halfway, axis=1, keepdims=True)
+
+    def tangent(z):
+        return np.sqrt(1 - z**2) / z
+
+    z = halfway[:, 2]
+    density = square / (np.pi * z**4 * (square + tangent(z) ** 2) ** 2)
+    fresnel = specular + (1 - specular) * (1 - halfway @ eye) ** 5
+    hidden = [(-1 + np.sqrt(1 + square * tangent(c) ** 2)) / 2 for c in (incoming[:, 2], eye[2])]
+    return density * fresnel / (1 + sum(hidden)) / (4 * incoming[:, 2] * eye[2])
+
+
+def reflected(cosines, roughness, specular, degree, size=100):
+    """Coefficients (v, K) of BRDF times cosine, with which light turns into radiance."""
+    z, weights = np.polynomial.legendre.leggauss(size)
+    z, weights = (z + 1) / 2, weights / 2
+    phi = (np.arange(2 * size) + 0.5) * np.pi / size
+    r = np.sqrt(1 - z**2)[:, None]
+    grid = np.stack([r * np.cos(phi), r * np.sin(phi), z[:, None] + 0 * phi], -1).reshape(-1, 3)
+    weights = np.repeat(weights * np.pi / size * z, len(phi))
+    basis = np.asarray(harmonics.evaluate(grid, degree))
+    eyes = np.stack([np.sqrt(1 - cosines**2), 0 * cosines, cosines], axis=1)
+    return np.stack([(brdf(grid, eye, roughness, specular) * weights) @ basis for eye in eyes])
+
+
+def by_lobe(cosines, material, degree):
+    """Coefficients of what `fixed_view` reflects of an open surface that is seen at an angle."""
+    # As one program for all angles: surfaces that are turned below one eye.
+    normals = np.stack([np.sqrt(1 - cosines**2), 0 * cosines, cosines], axis=1)
+    made = unshadowed(0 * normals, jnp.asarray(normals), degree)
+    up = np.array([0, 0, 1.0])
+    return fixed_view(made, up, material, distant=True).coefficients
+
+
+def turned(coefficients, cosines, degree):
+    """Turns each from n = z and the eye aside to the frame of `by_lobe`."""
+    out = []
+    for one, c in zip(coefficients, cosines, strict=True):
+        s = np.sqrt(1 - c**2)
+        # The eye (s, 0, c) comes to z, the normal z to (s, 0, c).
+        out.append(harmonics.rotate(one, np.array([[-c, 0, s], [0, -1, 0], [s, 0, c]])))
+    return np.stack(out)
+
+
+# By reflectance along the normal and roughness, at cosines of 0.3, 0.7 and 1: measured, and 0.01.
+ERRORS = {
+    (1.0, 0.3): (0.21, 0.18, 0.08),
+    (1.0, 0.5): (0.15, 0.17, 0.05),
+    (1.0, 0.8): (0.06, 0.13, 0.02),
+    (0.04, 0.3): (0.27, 0.2, 0.08),
+    (0.04, 0.5): (0.22, 0.23, 0.05),
+    (0.04, 0.8): (0.18, 0.22, 0.02),
+}
+
+
+def test_the_lobe_is_near_the_true_brdf():
+    cosines = np.array([0.3, 0.7, 1.0])
+    specular, roughness = np.repeat(np.array(list(ERRORS)), 3, axis=0).T
+    material = Material.ggx(0.0, specular[:, None], roughness)
+    got = np.asarray(by_lobe(np.tile(cosines, 6), material, DEGREE)).reshape(6, 3, -1)
+    for (color, rough), lobe in zip(ERRORS, got, strict=True):
+        exact = turned(reflected(cosines, rough, color, DEGREE), cosines, DEGREE)
+        # Of uniform light, what GGX reflects: measured to 0.26 %.
+        np.testing.assert_allclose(lobe[:, 0], exact[:, 0], rtol=0.003, atol=0)
+        errors = np.linalg.norm(lobe - exact, axis=1) / np.linalg.norm(exact, axis=1)
+        assert (errors < np.array(ERRORS[color, rough])).all(), (color, rough, errors)
+
+
+def test_every_method_shades_it(rng):
+    """Where each is the same integral, to rounding; colors and roughness by vertex."""
+    made, light, material = frame(rng)
+    expected = np.asarray(shade_glossy(light, made, EYE, material))
+    for got in (
+        shade_glossy(light, sample(made), EYE, material),
+        fixed_light(light, made)(EYE, material),
+        fixed_view(made, EYE, material)(light),
+    ):
+        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.slow
+def test_the_adaptive_ones_too(rng):
+    made, light, material = frame(rng, count=40)
+    expected = np.asarray(shade_glossy(light, made, EYE, material))
+    every = {"threshold": 0.0, "base": 1}
+    for method in (
+        adaptive.Masks(**every, diffuse_threshold=0.0),
+        adaptive.Levels(**every, diffuse_threshold=0.0),
+        adaptive.TwoStage(**every, middle=2),
+    ):
+        got = adaptive.shade(light, made, EYE, material, method).color
+        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    one = Material.ggx(0.1, material.specular, 0.4)
+    got = adaptive.shade(
+        light, made, EYE, one, adaptive.Anchors(threshold=0.0, base=1, quantized=False)
+    ).color
+    np.testing.assert_allclose(got, shade_glossy(light, made, EYE, one), rtol=0, atol=1e-11)
+
+
+def frame(rng, count=7):
+    """An open surface, a light and a material by vertex."""
+    normals = rng.normal(size=(count, 3)) + np.array([[0, -2, 0]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    made = unshadowed(rng.normal(size=(count, 3)), jnp.asarray(normals), DEGREE)
+    colors, roughness = rng.uniform(size=(count, 3)), rng.uniform(0.1, 1, size=count)
+    return made, rng.normal(size=(3, (DEGREE + 1) ** 2)), Material.ggx(0.1, colors, roughness)
+
+
+def test_its_derivatives(rng):
+    made, light, material = frame(rng)
+    weights = jnp.asarray(rng.normal(size=(7, 3)))
+
+    def shade(eye, specular, roughness):
+        return shade_glossy(light, made, eye, Material.ggx(0.1, specular, roughness))
+
+    arguments = jnp.asarray(EYE), material.specular, material.roughness
+    along = tuple(jnp.asarray(rng.normal(size=a.shape)) for a in arguments)
+    step = 1e-5
+
+    @jax.jit
+    def derivatives():
+        def at(t):
+            return shade(*jax.tree.map(lambda a, d: a + t * d, arguments, along))
+
+        forward = jax.jvp(shade, arguments, along)[1]
+        slopes = jax.vjp(shade, *arguments)[1](weights)
+        ends = jax.lax.map(at, jnp.asarray([-step, step]))
+        return forward, slopes, (ends[1] - ends[0]) / (2 * step)
+
+    forward, slopes, difference = derivatives()
+    np.testing.assert_allclose(forward, difference, rtol=0, atol=1e-7 * np.abs(forward).max())
+    backward = sum(float(jnp.sum(s * d)) for s, d in zip(slopes, along, strict=True))
+    np.testing.assert_allclose(backward, jnp.sum(weights * forward), rtol=1e-10, atol=0)
+    assert all(np.abs(slope).max() > 0 for slope in slopes)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "an exponent, of Phong's lobe, or a roughness, of GGX's, got neither"),
+        ({"exponent": 1.0, "roughness": 0.5}, "got both"),
+        ({"roughness": 1.5}, "expected roughness from 0 to 1, got 1.5"),
+        ({"roughness": np.array([0.5, -0.1])}, "expected roughness from 0 to 1, got -0.1"),
+        ({"roughness": np.ones((2, 3))}, r"roughness as a number or \(V,\), got shape \(2, 3\)"),
+        ({"roughness": np.ones(4)}, r"of vertices are {'specular': 2, 'roughness': 4}"),
+    ],
+)
+def test_bad_materials_are_refused(unchecked, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        Material(0.5, np.full((2, 1), 0.5), **arguments)
+
+
+def test_what_does_not_take_it_says_so(unchecked, rng):
+    made, light, _ = frame(rng)
+    rough = Material.ggx(0.1, 0.5, 0.4)
+    with pytest.raises(ValueError, match=r"at most 1 beside a roughness, .* got 2"):
+        Material.ggx(0.1, 2.0, 0.4)
+    with pytest.raises(ValueError, match="expected normalized=True with a roughness"):
+        shade_glossy(light, made, EYE, rough, normalized=False)
+    with pytest.raises(ValueError, match="tiles take the same lobe at every vertex"):
+        adaptive.shade(light, made, EYE, rough, adaptive.Tiles())
+    sun = sphere.Suns([[0.0, 0.0, 1.0]], [1e-4], [[1.0, 1.0, 1.0]])
+    with pytest.raises(ValueError, match=r"give shade_glossy suns\.harmonics"):
+        shade_sun(sun, made, material=rough, eye=EYE, shadows=False)
