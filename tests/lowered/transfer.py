@@ -23,6 +23,7 @@ from .sphere import suns
 WITHOUT = {
     "Material": "holds what it is given",
     "Transfer.belongs_to": "compares arrays on the host, and where they are traced their shapes",
+    "Material.ggx": "holds what it is given",
     "Transfer": "holds what it is given",
     "bake": "runs on the host: tests/transfer/test_bake_device.py lowers what it runs on a device",
     "bake_on": "runs on a cluster",

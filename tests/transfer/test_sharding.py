@@ -153,6 +153,25 @@ def test_glossy_shading_where_memory_is_short(rng, monkeypatch):
 
 
 @pytest.mark.slow
+def test_rough_materials(frame):
+    """The lobe of each vertex is made where the vertex is."""
+    light, made, eye, material = frame
+    rough = Material.ggx(material.diffuse, material.specular, material.exponent / 10)
+    specs = WHOLE, ROWS, WHOLE, ROWS
+    check_sharded(shade_glossy, (light, made, eye, rough), specs, ROWS)
+
+    def slope(roughness, light, made, eye, diffuse):
+        def loss(roughness):
+            material = Material.ggx(diffuse, 0.5, roughness)
+            return jnp.sum(shade_glossy(light, made, eye, material) ** 2)
+
+        return jax.grad(loss)(roughness)
+
+    arguments = rough.roughness, light, made, eye, rough.diffuse
+    check_sharded(slope, arguments, (ROWS, WHOLE, ROWS, WHOLE, ROWS), ROWS)
+
+
+@pytest.mark.slow
 def test_its_gradient_in_the_normals(frame):
     def slope(normals, light, made, eye, material):
         def loss(normals):

@@ -34,6 +34,7 @@ def calls():
             diffuse=floats(V, 3),
             specular=0.5,
             exponent=floats(V),
+            roughness=None,
             finite="diffuse specular exponent",
         ),
         "Material.ggx": of(
