@@ -40,7 +40,7 @@ class Case(NamedTuple):
         return pixels.reshape(HEIGHT, width, 4)
 
     def check(self, expected) -> None:
-        """At least 995 of 1000 pixels are within a step of 8 bits: at edges of materials none need be."""
+        """Compare pixels, of which 995 of 1000 must be within a step of 8 bits: edges need not."""
         picture, on_object = self.picture(), np.asarray(self.raster.mask)
         assert (on_object == (picture[..., 3] > 0)).mean() > 0.998
         inside = binary_erosion(on_object, np.ones((3, 3)))
