@@ -31,11 +31,13 @@ def sample_texture(
     `srgb_decode(picture / 255)`.
 
     - `footprint` (..., 2, 2): the change of (u, v) over a step to the right and over one down in
-      the picture that is drawn, in its columns; `Raster` has it. Where the longer of both is more
-      than a texel, coarser levels of the picture are looked up, blended between the two nearest
-      (Williams 1983; the scale factor of OpenGL 4.6, section 8.14.1, by the longer column).
-      Each level is the mean over the areas of its texels, whatever the size. Without, what is
-      finer than the steps between coordinates is sampled as it is, and flickers.
+      the picture that is drawn, in its columns; `Raster` has it. Where the longer of both is ρ >
+      √3 texels, coarser levels of the picture are looked up, blended between the two nearest
+      (Williams 1983). Each level is the mean over the areas of its texels, whatever the size.
+      Level log₂(ρ/√3) looks as far around as a mean over the step does: its texels and the look-up
+      between them have a variance of 4^level/12 + 4^level/6, the step ρ²/12. OpenGL's log₂ ρ is
+      that of `√3 * footprint`, and blurs more (`python -m experiments run surfaces.levels`).
+      Without a footprint, what is finer than the steps is sampled as it is, and flickers.
     - `wrap`: what stands beyond [0, 1]: "repeat" the picture again, "clamp" its outermost texels,
       or "mirror" the picture turned over.
 
@@ -124,7 +126,7 @@ def sample(
     if squared is None:
         return _bilinear(pyramid, jnp.asarray(pyramid.first)[picture], uv, wrap)
     first, last = jnp.asarray(pyramid.first)[picture], jnp.asarray(pyramid.last)[picture]
-    level = jnp.log2(jnp.maximum(squared, 1)) / 2
+    level = jnp.log2(jnp.maximum(squared / 3, 1)) / 2
     level = jnp.minimum(level, (last - first).astype(level.dtype))
     finer = jnp.floor(level)
     share = (level - finer).astype(pyramid.texels.dtype)[..., None]

@@ -1,0 +1,1 @@
+"""Surfaces other than vertices of one color: textures, beside a path tracer."""
