@@ -5,6 +5,8 @@ follows is a product of coefficients, for any light, and differentiates.
 """
 
 from ._bake import bake, bake_on
+from ._compress import compress
+from ._compressed import CompressedTransfer
 from ._file import load, save
 from ._fixed_light import FixedLight, fixed_light
 from ._fixed_view import FixedView, fixed_view
@@ -21,6 +23,7 @@ from ._unshadowed import unshadowed
 
 __all__ = [
     "AbstractTransfer",
+    "CompressedTransfer",
     "FixedLight",
     "FixedView",
     "Material",
@@ -31,6 +34,7 @@ __all__ = [
     "Transfer",
     "bake",
     "bake_on",
+    "compress",
     "fixed_light",
     "fixed_view",
     "fluence",

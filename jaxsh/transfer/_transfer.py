@@ -31,7 +31,7 @@ from ._surfaces import SurfaceKind, points_and_normals
 class AbstractTransfer(eqx.Module):
     """Holds how light from all around reaches V points, up to a degree, in one form or another.
 
-    The forms are `Transfer`, `SampledTransfer`, `QuantizedTransfer` and
+    The forms are `Transfer`, `SampledTransfer`, `QuantizedTransfer`, `CompressedTransfer` and
     `adaptive.StagedTransfer`; `shade_diffuse` takes each of them.
 
     **Example**

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 
 from jaxsh import sphere, transfer
@@ -27,8 +28,19 @@ WITHOUT = {
     "Transfer": "holds what it is given",
     "bake": "runs on the host: tests/transfer/test_bake_device.py lowers what it runs on a device",
     "bake_on": "runs on a cluster",
+    "compress": "runs on the host",
     "sun_visibility": "casts rays in NumPy",
 }
+
+
+def compressed():
+    """256 clusters of 8 components."""
+    weights, cluster, codes = (
+        jax.ShapeDtypeStruct(shape, dtype)
+        for shape, dtype in (((8, V), jnp.int8), ((V,), jnp.uint8), ((256, 9, K), jnp.int16))
+    )
+    rest = floats(256, 9), floats(V, 3), floats(V, 3), integers(V, 16)
+    return made_by(transfer.CompressedTransfer, weights, cluster, codes, *rest)
 
 
 def calls():
@@ -57,6 +69,8 @@ def calls():
         ),
         "FixedView.__call__": of(lambda view, light: view(light), view, light),
         "Transfer.truncated": of(lambda made: made.truncated(5), made),
+        "shade_diffuse, compressed": of(t.shade_diffuse, light, compressed(), albedo),
+        "shade_glossy, compressed": of(t.shade_glossy, light, compressed(), eye, material()),
         "fixed_light": of(t.fixed_light, light, made),
         "fixed_view": of(t.fixed_view, made, eye, material()),
         "fluence": of(t.fluence, light, volume),

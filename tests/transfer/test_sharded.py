@@ -54,6 +54,13 @@ def test_what_fills_up_sees_nothing(made):
     np.testing.assert_array_equal(shared.neighbors[V:], [[V, V]])
 
 
+def test_what_fills_up_a_compressed_transfer_is_black(made, light):
+    small = transfer.compress(made, clusters=3, components=2)
+    shared = small.sharded(DEVICES)
+    assert (shared.num_points, shared.num_clusters) == (W, 4)
+    check_same(transfer.shade_diffuse, (light, shared, 0.5), (light, small, 0.5))
+
+
 def check_same(function, shared, plain):
     """Calls it with arguments that are shared out, and with what they were before."""
     compiled = jax.jit(function).lower(*shared).compile()

@@ -16,6 +16,7 @@ from jaxsh.transfer import (
     QuantizedTransfer,
     SunVisibility,
     Transfer,
+    compress,
     fixed_light,
     fixed_view,
     fluence,
@@ -97,6 +98,14 @@ def test_its_gradient(frame):
     check_sharded(jax.grad(loss), arguments, specs, ROWS)
     total = {"all-reduce": "the light is that of all vertices"}
     check_sharded(jax.grad(loss, 1), arguments, specs, WHOLE, exchange=total)
+
+
+def test_clusters(frame, rng):
+    light, made, eye, material = frame
+    small = compress(made, clusters=2, components=2)
+    specs = specs_of(small, (COLUMNS, ROWS, WHOLE, WHOLE, ROWS, ROWS, ROWS))
+    check_sharded(shade_diffuse, (light, small, material.diffuse), (WHOLE, specs, ROWS), ROWS)
+    check_sharded(shade_glossy, (light, small, eye, material), (WHOLE, specs, WHOLE, ROWS), ROWS)
 
 
 def test_eight_bits(frame, rng):

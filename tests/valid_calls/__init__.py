@@ -61,6 +61,7 @@ MADE = {
     "sky": {"Axis", "FitError", "PreethamConstants", "SkyFit", "SkyWarning", "Solution"},
     "transfer": {
         "AbstractTransfer",
+        "CompressedTransfer",
         "QuantizedTransfer",
         "SampledTransfer",
         "StoredTransfer",

@@ -57,6 +57,9 @@ def calls():
         "SampledTransfer.sharded": of(t.sample(made()).sharded, devices=None, host=True),
         "QuantizedTransfer.sharded": of(t.quantize(made()).sharded, devices=None, host=True),
         "Transfer.sharded": of(made().sharded, devices=None, host=True),
+        "CompressedTransfer.sharded": of(
+            t.compress(made(), components=1).sharded, devices=None, host=True
+        ),
         "Transfer.truncated": of(made().truncated, degree=1),
         "FixedLight.__call__": of(
             t.fixed_light(light, made()), eye=eye(), material=material(), **flags, finite="eye"
@@ -80,6 +83,15 @@ def calls():
             scene=None,
             device=False,
             free="client store",
+        ),
+        "compress": of(
+            t.compress,
+            transfer=made(),
+            clusters=1,
+            components=1,
+            iterations=1,
+            seed=0,
+            host=True,
         ),
         "fixed_light": of(t.fixed_light, light=light, transfer=made(), finite="light"),
         "fixed_view": of(

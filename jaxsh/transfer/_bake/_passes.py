@@ -73,14 +73,14 @@ class _NoBar(contextlib.nullcontext):
     def update(self, rows: int) -> None: ...
 
 
-def progress_bar(total: int, shown: bool):
+def progress_bar(total: int, shown: bool, doing: str = "bake"):
     """Count points on a terminal, in a context, once it has taken more than a second."""
     if not shown:
         return _NoBar()
     from tqdm import tqdm
 
     # `disable=None` hides the bar when stderr is not a terminal.
-    return tqdm(total=total, desc="bake", unit=" points", delay=1, file=sys.stderr, disable=None)
+    return tqdm(total=total, desc=doing, unit=" points", delay=1, file=sys.stderr, disable=None)
 
 
 def _in_order(
