@@ -14,7 +14,8 @@ from .._core.devices import Devices, last_of, mesh_of, own_numbers, share, whole
 from .._core.linalg import shading_matmul
 from .._core.xla import keep_rows
 from ..harmonics import degree_of
-from ._glossy_kernels import node_passes, reflected
+from ._glossy_kernels import reflected
+from ._nodes import node_passes
 from ._transfer import AbstractTransfer, SurfaceKind, Transfer
 
 
@@ -126,6 +127,10 @@ class CompressedTransfer(AbstractTransfer):
     def reflections(self, eye: Float[Array, " 3"], distant: bool) -> Float[Array, "3 v"]:
         """Mirror the direction towards the eye about each normal, components first."""
         return reflected(eye, self.positions, self.normals, distant)
+
+    def normal_rows(self) -> Float[Array, "3 v"]:
+        """Return the normals, components first."""
+        return self.normals.T
 
     def node_passes(self, degree: int) -> Float[Array, "p n k"]:
         """Return what `at_nodes` takes of each pass of nodes."""
