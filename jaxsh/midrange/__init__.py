@@ -23,6 +23,7 @@ from ._surface import (
     surface_samples,
 )
 from ._taylor import project_cube, project_cube_with_gradient, taylor
+from ._visible_weights import visible_weights
 from ._weights import Weights, inverse_distance_weights, moving_least_squares_weights
 
 __all__ = [
@@ -57,4 +58,5 @@ __all__ = [
     "surface_samples",
     "taylor",
     "update_samples",
+    "visible_weights",
 ]

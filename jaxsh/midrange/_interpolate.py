@@ -13,7 +13,9 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import check_choice, check_type
 from .._core.linalg import matmul
 from .._core.xla import on_mesh, rows_at_once, varying_as
+from ._cube import RadianceCube
 from ._expansion import Expansion, check_positions, monomials, term_orders
+from ._visible_weights import visible_weights
 from ._weights import Weights
 
 Rule = Literal["none", "half", "full"]
@@ -28,6 +30,7 @@ def interpolate(
     positions: Float[ArrayLike, "v 3"],
     *,
     rule: Rule = "full",
+    visibility: RadianceCube | None = None,
 ) -> Float[Array, "v 3 k"]:
     """Interpolate a light's coefficients to V positions, as weighted means of expansions.
 
@@ -43,6 +46,8 @@ def interpolate(
       order 1 that is half the gradient. With weights of linear precision, Σ w_j = 1 and
       Σ w_j d_j = 0, it is exact one order above "full", for k ≥ 1; with eq. 16, which has no
       such precision, it is worse. Not in the paper; `docs/near_light_samples.md` derives it.
+    - `visibility`: the cubes captured at the samples' points, so that none speaks through a wall:
+      the weights are then those of `visible_weights`, for the rule "full".
 
     **Returns** (V, 3, K) in the dtype of the expansions. Linear in the terms and in the weights,
     differentiable in all, forward and reverse. To shade with it, `shade` does both at once.
@@ -66,6 +71,8 @@ def interpolate(
     if positions.ndim != 2:
         raise ValueError(f"expected positions (V, 3), got shape {positions.shape}")
     check_weights(expansions, weights, len(positions))
+    if visibility is not None:
+        weights = visible_weights(weights, visibility, positions)
     return _interpolate(expansions, weights, positions, rule)
 
 

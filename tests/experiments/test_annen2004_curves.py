@@ -26,6 +26,7 @@ OPTIONS = {
     "figure7": "--degree 1 --directions 64 --resolutions 32 --size 40 --samples 1",
     "figure8": "--degree 1 --directions 16 --resolution 32",
     "claims": "--degree 1 --directions 64 --distances 2 4 --counts 1 8 --grids 2 --records 64",
+    "leaks": "--grids 5 --positions 100 --rounds 1",
     "orders": "--degree 1 --directions 64 --resolution 16 --orders 0 1 --grids 2 --rounds 1",
     "placement": "--degree 1 --directions 64 --distances 2 --counts 1 4 --grids 2 --frames 3 "
     "--limit 4 --size 32",
@@ -103,6 +104,18 @@ class TestFigure8:
         )
         assert edges[0] == pytest.approx(surface[0], rel=0.05)
         assert edges[1] < 0.75 * surface[1]
+
+
+@pytest.mark.slow
+def test_planes_keep_light_out_of_a_closed_box(results):
+    _, table, rows = results("leaks")
+    inside = functools.partial(pick, rows, "leak")
+    assert inside(weights="plain") > 0.2
+    assert inside(weights="distances (Majercik et al.)") > 0.2
+    assert inside(weights="planes") < 1e-6
+    outside = {row["weights"]: row["error"] for row in rows}
+    assert outside["planes"] < 1.05 * outside["plain"]
+    assert "| planes | 0.0000 |" in table
 
 
 ORDERS = "constant", "first order", "second order", "third order"

@@ -113,4 +113,10 @@ def calls():
             lambda p: m.sphere_harmonics_with_gradient(ball, p, DEGREE), points
         ),
         "taylor": of(lambda c: m.taylor(c, DEGREE, 3), cubes),
+        "visible_weights": of(
+            lambda w, c, p: m.visible_weights(w, c, p).values,
+            made_by(m.Weights, floats(V, CUBES)),
+            cubes,
+            points,
+        ),
     }

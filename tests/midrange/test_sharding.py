@@ -136,3 +136,13 @@ def test_expansions_made_and_their_monomials(rng, points):
     monomials = functools.partial(midrange.monomials, order=2)
     check_sharded(monomials, (points,), (ROWS,), ROWS)
     check_sharded(jax.grad(lambda o: monomials(o).sum()), (points,), (ROWS,), ROWS)
+
+
+def test_visible_weights(points, rng):
+    cubes = random_cube(rng, 2, batch=(5,))
+
+    def weigh(points, cubes):
+        weights = midrange.inverse_distance_weights(points, cubes.point)
+        return midrange.visible_weights(weights, cubes, points).values
+
+    check_sharded(weigh, (points, cubes), (ROWS, WHOLE), ROWS)

@@ -14,6 +14,7 @@ def calls():
     scene, cube = m.Scene([light], [ball]), m.capture(m.Scene([light]), points[0], 2)
     samples = m.surface_samples([light], 4)
     expansions = m.Expansion(floats(5, 3), floats(5, 3, 4, 4))
+    five = m.capture(m.Scene([light]), expansions.point, 2)
     one = m.Expansion(floats(3), floats(3, 4, 4))
     baked = transfer.unshadowed(positions, floats(V, 3), 1)
     weights = m.inverse_distance_weights(positions, expansions.point)
@@ -79,10 +80,18 @@ def calls():
         "extrapolate": of(m.extrapolate, expansion=one, positions=positions),
         "grid_around": of(m.grid_around, positions=positions, shape=(2, 2, 3), host=True),
         "interpolate": of(
-            m.interpolate, expansions=expansions, weights=weights, positions=positions, rule="full"
+            m.interpolate,
+            expansions=expansions,
+            weights=weights,
+            positions=positions,
+            rule="full",
+            visibility=five,
         ),
         "inverse_distance_weights": of(
             m.inverse_distance_weights, positions=positions, points=points, exponent=4.0
+        ),
+        "visible_weights": of(
+            m.visible_weights, weights=weights, cubes=five, positions=positions, tolerance=1e-3
         ),
         "make_expansion": of(
             m.make_expansion,
