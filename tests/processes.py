@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.experimental import multihost_utils
 
-from jaxsh import inverse, sky, sphere, transfer
+from jaxsh import adaptive, inverse, sky, sphere, transfer
 
 V, DEGREE = 33, 2
 EYE = np.array([0.3, -2.0, 1.5])
@@ -20,7 +20,8 @@ def compute(devices, store: str) -> dict[str, np.ndarray]:
     """
     rng = np.random.default_rng(17)
     normals = np.asarray(sphere.fibonacci(V).directions)
-    made = transfer.unshadowed(0.3 * normals, normals, DEGREE).sharded(devices)
+    baked = transfer.unshadowed(0.3 * normals, normals, DEGREE)
+    made = baked.sharded(devices)
     light, albedo = rng.normal(size=(3, 9)), rng.uniform(0.1, 1, (V, 3))
     material = transfer.Material(albedo, 0.3, rng.uniform(1, 9, V)).sharded(devices)
     rows, colors = (transfer.shard_rows(x, devices) for x in (albedo, rng.uniform(0.1, 1, (V, 3))))
@@ -36,9 +37,17 @@ def compute(devices, store: str) -> dict[str, np.ndarray]:
     skies = sky.fit(glow, {}, degree=1, terms=[4], samples=[9], solver="qr", devices=devices)
     stored = transfer.open(store)
     read = transfer.shade_diffuse(light, stored.sharded(devices), 0.5)
+    one = transfer.Material(0.5, 0.5, 8.0)
+    near = adaptive.Levels(base=1, threshold=0.1, rings=1, smoothing=True)
+    both = baked.sharded()  # sets hang on who has which vertices
+    anchors, tiles = adaptive.make_anchors(both), adaptive.make_tiles(both, EYE, block=4)
     results = {
         "diffuse": transfer.shade_diffuse(light, made, rows),
         "glossy": transfer.shade_glossy(light, made, EYE, material),
+        "levels": adaptive.shade(light, made, EYE, material, near).color,
+        "stages": adaptive.shade(light, made, EYE, material, adaptive.TwoStage(base=1)).color,
+        "anchors": anchors(light, EYE, one).color,
+        "tiles": tiles(light, EYE, one).color,
         "projection": project(colors, quadrature),
         "fit": found.value,
         "deviation": found.confidence.deviation,

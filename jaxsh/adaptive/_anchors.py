@@ -9,7 +9,8 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
 from .._core.checks import align, check_cosine, check_degree, check_flag, check_number, check_type
-from .._core.xla import materialize
+from .._core.xla import materialize, on_mesh
+from ..harmonics import degree_of, num_coefficients
 from ..transfer import (
     AbstractTransfer,
     Material,
@@ -22,7 +23,6 @@ from ..transfer._glossy_kernels import lobe_polynomial, lobe_products, mirrored,
 from ._method import (
     AbstractMethod,
     check_known,
-    check_one_device,
     check_one_lobe,
     check_set,
     check_whole_degree,
@@ -33,6 +33,7 @@ from ._method import (
 )
 from ._regions import compacted, everywhere, seen_as_changed
 from ._result import AdaptiveResult, product_cost, sum_cost
+from ._sharing import axes_of, made_of_rows, material_axes, on_rows, own, sharing, sharing_of_groups
 from ._staged import SampledRows, diffuse_part, row_products, sample_rows
 
 # Distance of opposite normals, in half-extents of the mesh.
@@ -65,6 +66,8 @@ class AnchorSet(eqx.Module):
     rows: SampledRows
     base: SampledTransfer
     diffuse: AbstractTransfer
+    # So many vertices after another have anchors among themselves: those of a device.
+    group: int = eqx.field(static=True)
 
     @property
     def num_points(self) -> int:
@@ -105,17 +108,18 @@ class AnchorSet(eqx.Module):
         computed in full as an anchor and as a vertex. Differentiable in light and albedos where
         the choice of vertices does not change, forward and reverse; the choice is a constant.
 
-        Raises `ValueError` for shapes that do not fit, and for an exponent or roughness
-        per vertex.
+        Raises `ValueError` for shapes that do not fit, for an exponent or roughness per vertex, and
+        for a set that is shared out over devices otherwise than the transfer was that it was made
+        of.
         """
         light, eye, material = checked_frame(light, self.diffuse, eye, material)
         check_whole_degree("anchors", light, self.degree)
         check_one_lobe(material, self.num_points)
-        check_one_device("An AnchorSet", self.rows.samples)
+        shared = sharing_of_groups("an AnchorSet", self.rows.samples, self.group)
         distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
         limits = scalars(light.dtype, threshold=threshold, exposure=exposure)
         limits = limits["threshold"], limits["exposure"]
-        return _shade_anchors(light, eye, material, self, limits, distant, normalized)
+        return _shade_anchors(light, eye, material, self, limits, distant, normalized, shared)
 
 
 def make_anchors(
@@ -130,7 +134,8 @@ def make_anchors(
 
     **Arguments**
 
-    - `transfer`: of at least four vertices, with known values.
+    - `transfer`: of at least four vertices, with known values. Where several devices share them,
+      of four on each, and each device's vertices have anchors of their own.
     - `share`: of the vertices that are anchors, in (0, 1].
     - `base`: degree to which all vertices are computed.
     - `quantized`: whether samples and the diffuse part are rounded to eight bits.
@@ -138,7 +143,7 @@ def make_anchors(
 
     Takes three quarters of the transfer's memory for its samples, or three times that where they
     are not rounded, and the diffuse part. Neither traceable nor differentiable; raises
-    `ValueError` for a share or a base that is out of range, and for arrays on several devices.
+    `ValueError` for a share or a base that is out of range, and for too few vertices.
 
     **Example**
 
@@ -153,28 +158,37 @@ def make_anchors(
     check_type("transfer", transfer, Transfer)
     check_cosine(transfer)
     quantized = check_flag("quantized", quantized)
-    check_one_device("make_anchors", transfer)
     check_known("make_anchors", transfer)
-    count = transfer.num_points
+    shared = sharing(transfer.coefficients)
+    count = transfer.num_points // (shared.parts if shared else 1)
     share = check_number("share", share, above=0.0, most=1.0)
     if count < NEAREST:
-        raise ValueError(f"expected at least {NEAREST} vertices to share, got {count}")
+        where = " on each device" if shared else ""
+        raise ValueError(f"expected at least {NEAREST} vertices{where}, got {count}")
     if check_degree(base, "base") > transfer.degree:
         raise ValueError(f"expected base of at most {transfer.degree}, got {base}")
-    points, normals = np.asarray(transfer.positions), np.asarray(transfer.normals)
-    extent = max(float(np.ptp(points, axis=0).max()) / 2, 1e-30)
-    features = np.concatenate([points / extent, _NORMALS / 2 * normals], axis=1)
-    anchors = _spread(features, max(round(share * count), NEAREST))
-    distance, nearest = KDTree(features[anchors]).query(features, k=NEAREST)
-    weights = 1 / (distance**2 + 1e-12)
+    extent = max(float(jnp.ptp(transfer.positions, axis=0).max()) / 2, 1e-30)
     dtype = transfer.coefficients.dtype
+
+    def choose(part, points, normals):
+        features = np.concatenate([points / extent, _NORMALS / 2 * normals], axis=1)
+        anchors = _spread(features, max(round(share * count), NEAREST))
+        distance, nearest = KDTree(features[anchors]).query(features, k=NEAREST)
+        weights = 1 / (distance**2 + 1e-12)
+        weights = (weights / weights.sum(axis=1, keepdims=True)).astype(dtype)
+        anchors, nearest = anchors + part * count, nearest + part * len(anchors)
+        return anchors.astype(np.int32), nearest.astype(np.int32), weights
+
+    points = transfer.positions, transfer.normals
+    anchors, nearest, weights = made_of_rows(choose, shared, *points)
     return AnchorSet(
-        jnp.asarray(anchors.astype(np.int32)),
-        jnp.asarray(nearest.astype(np.int32)),
-        jnp.asarray((weights / weights.sum(axis=1, keepdims=True)).astype(dtype)),
+        anchors,
+        nearest,
+        weights,
         sample_rows(transfer.coefficients, transfer.degree, quantized),
         sample(transfer, base),
         diffuse_part(transfer, diffuse, quantized),
+        count,
     )
 
 
@@ -238,35 +252,21 @@ class Anchors(AbstractMethod):
         )
 
 
-@functools.partial(jax.jit, static_argnames=("distant", "normalized"))
-def _shade_anchors(light, eye, material, anchors, limits, distant, normalized):
-    threshold, exposure = limits
-    axis = mirrored(eye, anchors.base.positions, anchors.base.normals, distant)
-    see = functools.partial(
-        reflection, material, axis, anchors.base.normal_rows(), normalized=normalized
+@functools.partial(jax.jit, static_argnames=("distant", "normalized", "shared"))
+def _shade_anchors(light, eye, material, anchors, limits, distant, normalized, shared):
+    chosen = anchors.anchors, anchors.nearest, anchors.weights
+    glossy, active = on_rows(
+        functools.partial(_glossy, distant, normalized),
+        shared,
+        (
+            *(None, None, material_axes(material), None, 0),
+            *(axes_of(anchors.base, 2, 0, 1, 1), axes_of(anchors.rows, 0, None)),
+        ),
+        (0, 0),
+        *(light, eye, material, limits, chosen, anchors.base, anchors.rows),
     )
-    zonal, albedo = see(anchors.degree)
-    polynomial = lobe_polynomial(zonal)
-
-    def in_full(vertices):
-        return row_products(light, anchors.rows, axis, polynomial, vertices)
-
-    base_polynomial = lobe_polynomial(see(anchors.base.degree)[0])
-    width = (anchors.base.degree + 1) ** 2
-    base = lobe_products(light[:, :width], anchors.base, axis, base_polynomial)
-
-    def some_anchors(rows):
-        return in_full(anchors.anchors if rows is None else anchors.anchors[rows])
-
-    at_anchors = everywhere(some_anchors, len(anchors.anchors))
-    rest = at_anchors - base[:, anchors.anchors]
-    spread, carried = materialize(_between, rest, anchors.nearest, anchors.weights, base)
-    specular = albedo.T if albedo.ndim == 2 else albedo.reshape(-1, 1)
-    active = materialize(seen_as_changed, spread, threshold, specular * exposure)
-    glossy = jnp.where(active[None], compacted(in_full, active), carried).T
-
     diffuse = shade_diffuse(light, anchors.diffuse, material.diffuse)
-    color = diffuse + jnp.multiply(*align(glossy, albedo))
+    color = diffuse + glossy
     shares = {
         "anchors": jnp.asarray(len(anchors.anchors) / len(active), light.dtype),
         "specular": jnp.mean(active.astype(light.dtype)),
@@ -275,6 +275,33 @@ def _shade_anchors(light, eye, material, anchors, limits, distant, normalized):
     once = sum_cost(anchors.base.degree, target) + product_cost("diffuse", 0, target, target)
     again = sum_cost(target, target)
     return AdaptiveResult(color, shares, once + again * (shares["anchors"] + shares["specular"]))
+
+
+def _glossy(distant, normalized, light, eye, material, limits, chosen, base, rows):
+    """Computes the glossy part of the rows at hand, and which of them were computed in full."""
+    threshold, exposure = limits
+    anchors, nearest, weights = chosen
+    anchors, nearest = own(anchors, len(nearest)), own(nearest, len(anchors))
+    axis = mirrored(eye, base.positions, base.normals, distant)
+    see = functools.partial(reflection, material, axis, base.normal_rows(), normalized=normalized)
+    zonal, albedo = see(degree_of(light.shape[-1]))
+    polynomial = lobe_polynomial(zonal)
+    lights = light[:, : num_coefficients(base.degree)]
+    low = lobe_products(lights, base, axis, lobe_polynomial(see(base.degree)[0]))
+
+    def in_full(vertices):
+        return row_products(light, rows, axis, polynomial, vertices)
+
+    def some_anchors(some):
+        return in_full(anchors if some is None else anchors[some])
+
+    at_anchors = everywhere(some_anchors, len(anchors), whole=on_mesh(anchors))
+    rest = at_anchors - low[:, anchors]
+    spread, carried = materialize(_between, rest, nearest, weights, low)
+    specular = albedo.T if albedo.ndim == 2 else albedo.reshape(-1, 1)
+    active = materialize(seen_as_changed, spread, threshold, specular * exposure)
+    glossy = jnp.where(active[None], compacted(in_full, active), carried).T
+    return jnp.multiply(*align(glossy, albedo)), active
 
 
 def _between(rest, nearest, weights, base):

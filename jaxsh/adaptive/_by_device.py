@@ -1,15 +1,12 @@
-"""Vertices that several devices share out: each filters its own, and none gathers another's."""
-
-import math
+"""Vertices that several devices share out: each filters its own."""
 
 import jax
-from jax.sharding import AxisType, PartitionSpec
 from jaxtyping import Array
 
-from .._core.checks import is_concrete
 from ..transfer import Material, Transfer
 from ._filter import Filter, filtered
 from ._result import AdaptiveResult
+from ._sharing import material_axes, on_rows, sharing
 
 
 def filtered_by_device(
@@ -19,37 +16,28 @@ def filtered_by_device(
     material: Material,
     options: Filter,
     previous: dict[str, Array] | None,
+    compact: bool,
 ) -> AdaptiveResult:
     """Does what `filtered` does on each device with its vertices, compacted there.
 
-    Shares and cost are means over the devices; nothing else goes from one to another.
+    Shares and cost are means over the devices. Rings and smoothing look at neighbors, which other
+    devices may have: these give each other who is inside, and for smoothing the colors. Nothing
+    else goes from one to another.
     """
-    sharding = jax.typeof(transfer.coefficients).sharding
-    mesh, types = sharding.mesh, sharding.mesh.axis_types
-    arguments = light, transfer, eye, material, options, previous
-    if all(kind == AxisType.Manual for kind in types):  # inside `shard_map`
-        return filtered(*arguments, compact=True)
-    given = transfer.coefficients.sharding if is_concrete(transfer.coefficients) else sharding
-    assert isinstance(given, jax.sharding.NamedSharding)  # it is on a mesh
-    mesh = given.mesh
-    names = next(iter(given.spec), None)
-    # Automatic axes do not tell a trace how they are used: all of them are, where that goes.
-    unknown = AxisType.Auto in types and not is_concrete(transfer.coefficients)
-    if unknown and transfer.num_points % math.prod(mesh.axis_sizes) == 0:
-        names = mesh.axis_names
-    rows, whole = PartitionSpec(names), PartitionSpec()
+    shared = sharing(transfer.coefficients)
+    if shared is None:
+        return filtered(light, transfer, eye, material, options, previous, compact=compact)
 
-    lobes = [rows if own else whole for own in material.per_vertex]
-    lobes = jax.tree.unflatten(jax.tree.structure(material), lobes)
+    names, lobes = shared.names, material_axes(material)
 
     def one(*arguments):
-        result = filtered(*arguments, compact=True)
+        result = filtered(*arguments, compact=compact, names=names)
         shares = result.active_fraction, result.relative_cost
         if names is not None:
             shares = jax.tree.map(lambda share: jax.lax.pmean(share, names), shares)
         return result.color, *shares, result.shown_degree
 
-    specs, out = (whole, rows, whole, lobes, whole, rows), (rows, whole, whole, rows)
-    run = jax.shard_map(one, mesh=mesh, in_specs=specs, out_specs=out)
-    color, fractions, cost, degrees = run(*arguments)
+    axes, out = (None, 0, None, lobes, None, 0), (0, None, None, 0)
+    arguments = light, transfer, eye, material, options, previous
+    color, fractions, cost, degrees = on_rows(one, shared, axes, out, *arguments)
     return AdaptiveResult(color, fractions, cost, degrees)

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -78,7 +79,7 @@ def _products(light, transfer: Transfer, eye, material, options: Filter):
     return Products(light, product_matrix(light), transfer.coefficients, kernels), specular
 
 
-@functools.partial(jax.jit, static_argnames="compact")
+@functools.partial(jax.jit, static_argnames=("compact", "names"))
 def filtered(
     light: Float[Array, "3 k"],
     transfer: Transfer,
@@ -87,20 +88,26 @@ def filtered(
     options: Filter,
     previous: dict[str, Array] | None,
     compact: bool,
+    names: Any = None,
 ) -> AdaptiveResult:
-    """Runs algorithm 1 for the diffuse and the specular part, refined and smoothed."""
+    """Runs algorithm 1 for the diffuse and the specular part, refined and smoothed.
+
+    `names` are of the axes of a mesh that share the vertices out, inside `shard_map`.
+    """
     products, specular = _products(light, transfer, eye, material, options)
     color, cost = jnp.zeros((3, transfer.num_points), light.dtype), 0.0
     fractions, degrees = {}, {}
     for kind, albedo in albedos(material.diffuse, specular, transfer.num_points).items():
-        shown, region, work = _one(kind, albedo, products, transfer, options, previous, compact)
+        shown, region, work = _one(
+            kind, albedo, products, transfer, options, previous, compact, names
+        )
         color = color + albedo * shown
         fractions[kind], degrees[kind] = region.fractions, region.degree
         cost = cost + work
     return AdaptiveResult(color.T, fractions, jnp.asarray(cost, color.dtype), degrees)
 
 
-def _one(kind, albedo, products, transfer, options, previous, compact):
+def _one(kind, albedo, products, transfer, options, previous, compact, names):
     count, target = transfer.num_points, degree_of(products.light.shape[-1])
     whole = on_mesh(products.transfer)
     seen = jax.lax.stop_gradient(options.exposure * albedo)
@@ -139,7 +146,7 @@ def _one(kind, albedo, products, transfer, options, previous, compact):
         def joins(fringe):
             return seen_as_changed(jax.lax.stop_gradient(every_level(fringe)), limit, seen)
 
-        grown = grow(region.active, transfer.neighbors, joins, options.rings)
+        grown = grow(region.active, transfer.neighbors, joins, options.rings, names)
         joined = grown & ~region.active
         region = region._replace(
             added=jnp.where(joined[None], every_level(joined), region.added),
@@ -148,7 +155,7 @@ def _one(kind, albedo, products, transfer, options, previous, compact):
         )
         total_cost += cost(options.base, target) * jnp.mean(joined, dtype=base.dtype)
     if options.smoothing:
-        added = smooth(region.added, region.active, transfer.neighbors)
+        added = smooth(region.added, region.active, transfer.neighbors, names)
         region = region._replace(added=added)
     return base + region.added, region, total_cost if compact else cost(0, target)
 

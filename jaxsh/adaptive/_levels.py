@@ -7,14 +7,13 @@ import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
 from .._core.checks import check_choice, check_degree, check_flag, check_size, check_type
-from .._core.xla import on_mesh
 from ..harmonics import degree_of
 from ..transfer import AbstractTransfer, Material
 from ._by_device import filtered_by_device
 from ._filter import Filter, filtered
 from ._method import (
     AbstractMethod,
-    check_one_device,
+    check_neighbors,
     checked_frame,
     checked_scalar,
     plain_transfer,
@@ -140,8 +139,6 @@ class Masks(AbstractFilter):
         eye: Float[ArrayLike, " 3"],
         material: Material,
     ) -> AdaptiveResult:
-        if self.rings or self.smoothing:
-            check_one_device("Masks with rings or smoothing", transfer)
         return _filtered(self, "masks", light, transfer, eye, material, compact=False)
 
 
@@ -178,8 +175,6 @@ class Levels(AbstractFilter):
         eye: Float[ArrayLike, " 3"],
         material: Material,
     ) -> AdaptiveResult:
-        if self.rings or self.smoothing:
-            check_one_device("Levels with rings or smoothing", transfer)
         return _filtered(self, "levels", light, transfer, eye, material, compact=True)
 
 
@@ -188,6 +183,9 @@ def _filtered(method, name, light, transfer, eye, material, compact):
     light, eye, material = checked_frame(light, plain, eye, material)
     settings = method.settings(light, method.diffuse_threshold)
     previous = method.remembered(plain.num_points)
-    if compact and on_mesh(plain):
-        return filtered_by_device(light, plain, eye, material, settings, previous)
-    return filtered(light, plain, eye, material, settings, previous, compact=compact)
+    frame = light, plain, eye, material, settings, previous
+    if method.rings or method.smoothing:
+        check_neighbors(type(method).__name__, plain)
+    elif not compact:
+        return filtered(*frame, compact=False)
+    return filtered_by_device(*frame, compact=compact)

@@ -7,14 +7,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import as_float, check_cosine, check_options, check_type, is_concrete
-from .._core.xla import on_mesh
 from ..harmonics import degree_of
 from ..transfer import AbstractTransfer, Material, Transfer
 from ..transfer._glossy_kernels import checked_eye, checked_material, checked_one_light
 from ._result import AdaptiveResult
+from ._sharing import inside_shard_map
 
 
 class AbstractMethod(eqx.Module):
@@ -116,20 +117,18 @@ def plain_transfer(name: str, transfer: AbstractTransfer) -> Transfer:
     return plain
 
 
-def check_one_device(name: str, *trees) -> None:
-    """Raises `ValueError` for arrays on several devices."""
-    if on_mesh(*trees):
+def check_neighbors(name: str, *trees) -> None:
+    """Raises `ValueError` inside `shard_map`, where neighbors are out of reach."""
+    if inside_shard_map(*trees):
         raise ValueError(
-            f"{name} gathers vertices from all over the mesh, which would move them between "
-            "devices: expected arrays on one device; with several, take Masks() or Levels() "
-            "without rings and smoothing, or transfer.shade_glossy"
+            f"{name} with rings or smoothing looks at neighbors, which other devices may have: "
+            "call it outside shard_map"
         )
 
 
 def check_known(name: str, *trees) -> None:
     """Raises `ValueError` for arrays whose values are being traced."""
-    arrays = (leaf for leaf in jax.tree.leaves(trees) if isinstance(leaf, Array))
-    if not all(map(is_concrete, arrays)):
+    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(trees)):
         raise ValueError(
             f"{name} looks at the values of its arguments and cannot be traced: call it before "
             "jit, vmap or grad, and give them the result"

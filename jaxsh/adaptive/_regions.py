@@ -2,11 +2,11 @@
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, Shaped
 
 from .._core.xla import block_by_block, equal_blocks, on_mesh, rows_at_once
 
@@ -151,39 +151,60 @@ def grow(
     neighbors: Int[Array, "v n"],
     joins: Callable[[Bool[Array, " v"]], Bool[Array, " v"]],
     rings: int,
+    names: Any = None,
 ) -> Bool[Array, " v"]:
     """Searches breadth-first outwards from a region, for at most so many rings (§4.4).
 
     Each ring is what borders on the region and was not looked at before; `joins` says which of it
-    joins. The search ends early where nothing does.
+    joins. The search ends early where nothing does. `names` are of the axes of a mesh that share
+    the vertices out, inside `shard_map`: in each ring all devices learn who is inside.
     """
 
     def ring(carry):
         count, region, seen, _ = carry
-        fringe = jnp.any(region[neighbors], axis=1) & ~seen
+        fringe = jnp.any(_of_all(region, names)[neighbors], axis=1) & ~seen
         joined = joins(fringe) & fringe
-        return count + 1, region | joined, seen | fringe, jnp.any(joined)
+        return count + 1, region | joined, seen | fringe, someone(joined)
+
+    def someone(region):
+        found = jnp.any(region)
+        return found if names is None else jax.lax.pmax(found.astype(jnp.int32), names) > 0
 
     def more(carry):
         return carry[-1] & (carry[0] < rings)
 
-    start = jnp.asarray(0, jnp.int32), region, region, jnp.any(region)
+    start = jnp.asarray(0, jnp.int32), region, region, someone(region)
     return jax.lax.while_loop(more, ring, start)[1]
 
 
+def _of_all(values: Shaped[Array, "... v"], names: Any) -> Shaped[Array, "... w"]:
+    """Values of the vertices of all devices, in their order."""
+    if names is None:
+        return values
+    return jax.lax.all_gather(values, names, axis=values.ndim - 1, tiled=True)
+
+
 def smooth(
-    added: Float[Array, "3 v"], region: Bool[Array, " v"], neighbors: Int[Array, "v n"]
+    added: Float[Array, "3 v"],
+    region: Bool[Array, " v"],
+    neighbors: Int[Array, "v n"],
+    names: Any = None,
 ) -> Float[Array, "3 v"]:
     """Fades out what a region adds to the base, over two rings around it (figure 7).
 
     In breadth-first order each vertex of a ring takes the mean over all its neighbors, so that
-    the second ring sees the first one's new values.
+    the second ring sees the first one's new values. `names` as for `grow`: what is added goes to
+    all devices too, twice.
     """
-    real = neighbors != jnp.arange(len(neighbors), dtype=neighbors.dtype)[:, None]
+    numbers = jnp.arange(len(neighbors), dtype=neighbors.dtype)
+    if names is not None:
+        numbers = numbers + jax.lax.axis_index(names).astype(numbers.dtype) * len(numbers)
+    real = neighbors != numbers[:, None]
     valence = jnp.maximum(jnp.sum(real, axis=1), 1).astype(added.dtype)[None]
     for _ in range(2):
-        ring = jnp.any(region[neighbors], axis=1) & ~region
-        mean = jnp.sum(jnp.where(real[None], added[:, neighbors], 0.0), axis=-1) / valence
+        ring = jnp.any(_of_all(region, names)[neighbors], axis=1) & ~region
+        near = _of_all(added, names)[:, neighbors]
+        mean = jnp.sum(jnp.where(real[None], near, 0.0), axis=-1) / valence
         added = jnp.where(ring[None], mean, added)
         region = region | ring
     return added

@@ -8,19 +8,20 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Int8
 
-from .._core.checks import check_cosine, check_degree, check_flag, check_type
+from .._core.checks import check_cosine, check_degree, check_flag, check_known, check_type
+from .._core.devices import Devices, mesh_of, share, whole
 from .._core.linalg import matmul, shading_tall_product
 from .._core.xla import materialize
 from ..harmonics import degree_of
 from ..transfer import (
     AbstractTransfer,
+    QuantizedTransfer,
     SampledTransfer,
     Transfer,
     quantize,
     sample,
 )
 from ..transfer._glossy_kernels import in_steps, lobe, product_nodes
-from ._method import check_one_device
 
 
 class SampledRows(eqx.Module):
@@ -73,6 +74,22 @@ class StagedTransfer(AbstractTransfer):
         """The degrees of base, middle and light."""
         return self.base.degree, self.middle.degree, self.target
 
+    def sharded(self, devices: Devices = None) -> "StagedTransfer":
+        """Share the points out over devices, as `Transfer.sharded` does."""
+        check_known("transfer", self)
+        mesh = mesh_of(devices)
+        assert isinstance(self.diffuse, Transfer | QuantizedTransfer)  # what `stage` makes
+        return StagedTransfer(
+            self.transfer.sharded(mesh),
+            self.diffuse.sharded(mesh),
+            self.base.sharded(mesh),
+            self.middle.sharded(mesh),
+            SampledRows(share(self.rows.samples, mesh), whole(self.rows.scales, mesh)),
+            self.target,
+            surface=self.surface,
+            cosine=self.cosine,
+        )
+
     def irradiances(self, lights: Float[Array, "n k"]) -> Float[Array, "v n"]:
         return self.diffuse.irradiances(lights)
 
@@ -100,7 +117,9 @@ def stage(
     - `base`: degree below which nobody falls.
     - `quantized`: whether the samples and the diffuse part are rounded to eight bits.
 
-    Raises `ValueError` unless base <= middle <= degree <= the transfer's.
+    Of a transfer that several devices share, each stages its own points; for eight bits they give
+    each other the largest value of each harmonic and node. Raises `ValueError` unless base <=
+    middle <= degree <= the transfer's.
 
     **Example**
 
@@ -122,7 +141,6 @@ def stage(
             f"expected base <= middle <= degree <= the transfer's, {transfer.degree}, got {base}, "
             f"{middle} and {degree}"
         )
-    check_one_device("stage", transfer)
     return StagedTransfer(
         transfer,
         diffuse_part(transfer, None, quantized),

@@ -14,6 +14,7 @@ from ..transfer import AbstractTransfer, Transfer, quantize
 from ..transfer._glossy_kernels import checked_eye
 from ._local_rule import check_rule, local_rule
 from ._method import check_known
+from ._sharing import sharing
 from ._tile_samples import places
 from ._tiles import DIRECTIONS, EXPONENT, TileSet, arrange, arranged_in_slices
 from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling, vertex_areas
@@ -117,7 +118,8 @@ def make_tile_atlas(
     distant, center = distance is None, jnp.zeros((3,), transfer.positions.dtype)
     eyes = towards
     if distance is not None:
-        center = (transfer.positions.max(axis=0) + transfer.positions.min(axis=0)) / 2
+        middle = (transfer.positions.max(axis=0) + transfer.positions.min(axis=0)) / 2
+        center = jnp.asarray(np.asarray(middle))  # of the vertices of all devices
         eyes = center[None] + distance * towards
     areas = vertex_areas(transfer)
     tilings = [
@@ -175,7 +177,11 @@ class TileFollower:
             slices = 1 if all(device.platform == "cpu" for device in devices) else _SLICES
         self._slices = check_size("slices", slices)
         self._atlas, self._transfer, self._keep = atlas, transfer, keep
-        self._permutation = np.asarray(atlas.permutation)  # once, since it waits for the device
+        # Looked at once, since that waits for the device.
+        shared, count = sharing(transfer.coefficients), transfer.num_points
+        self._permutation = np.asarray(atlas.permutation) if shared is None else None
+        some = [] if shared is None else atlas.permutation
+        self._places = [places(one, count, shared) for one in some]
         self._begun: tuple[int, Iterator[TileSet | None]] | None = None
         self._diffuse = quantize(transfer)  # which all sets share
         self._sets: dict[int, TileSet] = {}  # the one last used at the end
@@ -206,7 +212,10 @@ class TileFollower:
 
     def _in_slices(self, view: int) -> Iterator[TileSet | None]:
         atlas, made = self._atlas, self._transfer
-        place = places(self._permutation[view], made.num_points)
+        if self._permutation is not None:
+            place = places(self._permutation[view], made.num_points, None)
+        else:
+            place = self._places[view]
         rule = local_rule(made.degree, atlas.directions, atlas.exponent)
         return arranged_in_slices(
             made, atlas.tiling(view), place, rule, self._diffuse, self._slices

@@ -11,33 +11,68 @@ from .._core.linalg import matmul
 from .._core.xla import in_turn, rows_at_once
 from ..harmonics import evaluate, rotate
 from ..transfer._glossy_kernels import in_steps, rows_of
+from ._sharing import Shared, made_of_rows, on_rows, own
+
+# Along which axis the rows of a device stand in a transfer, a tiling and a rule, and in what
+# `outlined` gives beside its weights.
+_GIVEN = (0, 0, None, None)
+_OUTLINE = (0, 1, 1, 1)
 
 
-def places(permutation: Int[np.ndarray, "blocks b"], vertices: int) -> Int[np.ndarray, " v"]:
+def places(
+    permutation: Int[Array | np.ndarray, "blocks b"], vertices: int, shared: Shared | None
+) -> Int[Array, " v"]:
     """Finds where in a permutation each vertex is; raises `ValueError` where it is of others."""
-    place = np.full(max(vertices, permutation.max() + 1), -1, np.int32)
-    place[permutation.ravel()] = np.arange(permutation.size, dtype=np.int32)
-    if len(place) != vertices or place.min() < 0:
-        held = np.count_nonzero(place >= 0)
-        raise ValueError(f"expected a tiling of {vertices} vertices, got one of {held}")
-    return place
+    parts = shared.parts if shared else 1
+    count = vertices // parts
+
+    def find(part, permutation):
+        inside = permutation - part * count
+        place = np.full(count, -1, np.int32)
+        if inside.min() >= 0 and inside.max() < count:
+            place[inside.ravel()] = np.arange(inside.size, dtype=np.int32)
+        if place.min() < 0:
+            held = len(np.unique(permutation))
+            where = " on each device" if parts > 1 else ""
+            raise ValueError(f"expected a tiling of {count} vertices{where}, got one of {held}")
+        return (place + np.int32(part * inside.size),)
+
+    if len(permutation) % parts:
+        raise ValueError(
+            f"expected a tiling made of a transfer that {parts} devices share, got "
+            f"{len(permutation)} blocks"
+        )
+    return made_of_rows(find, shared, permutation)[0]
 
 
-@functools.partial(jax.jit, static_argnames="quantized")
-def arrange_all(transfer, tiling, directions, rows, quantized):
-    rows, *outline = outlined(transfer, tiling, directions, rows)
-    parts = tiling.permutation, tiling.tile
-    return *_sampled(transfer.coefficients, parts, rows, quantized), *outline
+@functools.partial(jax.jit, static_argnames=("quantized", "shared"))
+def arrange_all(transfer, tiling, directions, rows, quantized, shared=None):
+    def arrange(transfer, tiling, directions, rows):
+        rows, *outline = _outlined(transfer, tiling, directions, rows)
+        return *_sampled(transfer.coefficients, _own(transfer, tiling), rows, quantized), *outline
+
+    return on_rows(arrange, shared, _GIVEN, (0, 0, *_OUTLINE), transfer, tiling, directions, rows)
 
 
-@jax.jit
-def outlined(transfer, tiling, directions, rows):
+@functools.partial(jax.jit, static_argnames="shared")
+def outlined(transfer, tiling, directions, rows, shared):
     """All but the samples, and the weights that these are sums with."""
+    given = transfer, tiling, directions, rows
+    return on_rows(_outlined, shared, _GIVEN, (0, *_OUTLINE), *given)
+
+
+def _own(transfer, tiling):
+    """The vertex at each place and the tile of each block, counted from this device's first."""
+    permutation = own(tiling.permutation, transfer.num_points)
+    return permutation, own(tiling.tile, len(tiling.axes))
+
+
+def _outlined(transfer, tiling, directions, rows):
     turns = _turns(tiling.axes)
     directions = matmul(directions[None], jnp.swapaxes(turns, 1, 2))
     rows = rotate(rows, turns[:, None])
     basis = evaluate(directions, transfer.degree, axis=0)
-    order = tiling.permutation.reshape(-1)
+    order = _own(transfer, tiling)[0].reshape(-1)
     positions, normals = rows_of(transfer.positions[order], transfer.normals[order])
     return rows, directions, basis, positions, normals
 
@@ -53,13 +88,27 @@ def _sampled(coefficients, parts, rows, quantized):
     return in_turn(sampled, parts, most=rows_at_once(size))
 
 
-@functools.partial(jax.jit, static_argnames="size")
-def slice_of(coefficients, tiling, rows, start, size):
-    parts = (
-        jax.lax.dynamic_slice_in_dim(array, start, size)
-        for array in (tiling.permutation, tiling.tile)
-    )
-    return _sampled(coefficients, tuple(parts), rows, True)
+@functools.partial(jax.jit, static_argnames=("size", "shared"))
+def slice_of(transfer, tiling, rows, start, size, shared):
+    """The samples of `size` blocks of each device."""
+
+    def sampled(transfer, tiling, rows, start):
+        parts = (
+            jax.lax.dynamic_slice_in_dim(array, start, size) for array in _own(transfer, tiling)
+        )
+        return _sampled(transfer.coefficients, tuple(parts), rows, True)
+
+    return on_rows(sampled, shared, (*_GIVEN[:2], 0, None), 0, transfer, tiling, rows, start)
+
+
+@functools.partial(jax.jit, static_argnames=("starts", "shared"))
+def joined(slices, starts, shared):
+    """Joins the slices of each device, each from where the one before has ended."""
+
+    def join(slices):
+        return jnp.concatenate([one[start:] for one, start in zip(slices, starts, strict=True)])
+
+    return on_rows(join, shared, (0,), 0, slices)
 
 
 def _turns(axes: Float[Array, "tiles 3"]) -> Float[Array, "tiles 3 3"]:

@@ -26,15 +26,15 @@ from ._local_rule import LocalRule, check_rule, local_rule
 from ._method import (
     AbstractMethod,
     check_known,
-    check_one_device,
     check_set,
     check_whole_degree,
     one_exponent,
     plain_transfer,
 )
 from ._result import AdaptiveResult, full_cost, product_cost, sum_cost
+from ._sharing import Shared, on_each_device, on_rows, own, sharing, sharing_of_groups
 from ._staged import diffuse_part
-from ._tile_samples import arrange_all, outlined, places, slice_of
+from ._tile_samples import arrange_all, joined, outlined, places, slice_of
 from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling
 
 DIRECTIONS = 40
@@ -71,6 +71,8 @@ class TileSet(eqx.Module):
     positions: Float[Array, "3 places"]
     normals: Float[Array, "3 places"]  # at unit length
     diffuse: AbstractTransfer
+    # So many vertices after another have tiles among themselves: those of a device.
+    group: int = eqx.field(static=True)
 
     @property
     def num_points(self) -> int:
@@ -113,17 +115,18 @@ class TileSet(eqx.Module):
         and differentiable in them, in the eye and in the exponent, forward and reverse; the
         transfer's glossy part is a constant.
 
-        Raises `ValueError` for shapes that do not fit, for an exponent per vertex, and for a
-        roughness, whose lobe changes with the angle of view.
+        Raises `ValueError` for shapes that do not fit, for an exponent per vertex, for a roughness,
+        whose lobe changes with the angle of view, and for a set that is shared out over devices
+        otherwise than the transfer was that it was made of.
         """
         count, dtype = self.num_points, self.basis.dtype
         light = checked_one_light(light, count, self.degree, dtype)
         check_whole_degree("tiles", light, self.degree)
         eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
         one_exponent(material, count)
-        check_one_device("A TileSet", self.samples)
+        shared = sharing_of_groups("a TileSet", self.place, self.group)
         distant, normalized = check_flag("distant", distant), check_flag("normalized", normalized)
-        return _shade_tiles(light, eye, material, self, distant, normalized)
+        return _shade_tiles(light, eye, material, self, distant, normalized, shared)
 
 
 def make_tiles(
@@ -142,7 +145,8 @@ def make_tiles(
 
     **Arguments**
 
-    - `transfer`: with known values.
+    - `transfer`: with known values. Where several devices share its vertices, each device's have
+      tiles of their own, `num_tiles` on each.
     - `eye`: a point, or with `distant` the direction to an eye far away.
     - `num_tiles`: more are more exact.
     - `block`: the number of vertices that a tile's size is a multiple of.
@@ -155,8 +159,8 @@ def make_tiles(
 
     **Returns** a `TileSet`, to be called with light, eye and material. It takes `directions`
     numbers a vertex, and the diffuse part. Neither traceable nor differentiable; raises
-    `ValueError` for an eye that is no vector, for numbers below 1, for an exponent that is not
-    above -1, and for arrays on several devices.
+    `ValueError` for an eye that is no vector, for numbers below 1, and for an exponent that is not
+    above -1.
 
     **Example**
 
@@ -192,7 +196,7 @@ def arrange(
     """Sample the transfer in the order of a tiling, in directions about each tile's own.
 
     Other arguments and errors as for `make_tiles`; raises `ValueError` for a tiling of another
-    mesh too.
+    mesh, or of one that is shared out otherwise, too.
 
     **Example**
 
@@ -208,20 +212,19 @@ def arrange(
     check_cosine(transfer)
     check_type("tiling", tiling, Tiling)
     quantized = check_flag("quantized", quantized)
-    check_one_device("arrange", transfer)
     check_known("arrange", transfer, tiling)
-    place = places(np.asarray(tiling.permutation), transfer.num_points)
-    rule = local_rule(transfer.degree, directions, float(exponent))
-    rule = tuple(jnp.asarray(part, transfer.positions.dtype) for part in rule)
+    shared = sharing(transfer.coefficients)
+    place = places(tiling.permutation, transfer.num_points, shared)
+    rule = _placed(local_rule(transfer.degree, directions, float(exponent)), transfer, shared)
     diffuse = diffuse_part(transfer, diffuse, quantized)
-    arranged = arrange_all(transfer, tiling, rule[0], rule[1], quantized)
-    return _tile_set(tiling, place, rule, diffuse, arranged)
+    arranged = arrange_all(transfer, tiling, rule[0], rule[1], quantized, shared)
+    return _tile_set(tiling, place, rule, diffuse, arranged, shared)
 
 
 def arranged_in_slices(
     transfer: Transfer,
     tiling: Tiling,
-    place: Int[np.ndarray, " v"],
+    place: Int[Array, " v"],
     rule: LocalRule,
     diffuse: AbstractTransfer,
     slices: int,
@@ -230,27 +233,34 @@ def arranged_in_slices(
 
     Looks at no values, so that it waits for nothing that is under way on the device.
     """
-    parts = tuple(jnp.asarray(part, transfer.positions.dtype) for part in rule)
-    rows, *outline = outlined(transfer, tiling, parts[0], parts[1])
-    blocks = len(tiling.tile)
+    shared = sharing(transfer.coefficients)
+    parts = _placed(rule, transfer, shared)
+    rows, *outline = outlined(transfer, tiling, parts[0], parts[1], shared)
+    blocks = len(tiling.tile) // (shared.parts if shared else 1)
     size = equal_blocks(blocks, math.ceil(blocks / slices))
-    done = []
+    done, starts = [], []
     for start in range(0, blocks, size):
         # The last slice begins early, so that all have one shape and take one program.
         first = min(start, blocks - size)
-        part = slice_of(transfer.coefficients, tiling, rows, np.int32(first), size)
-        done.append(tuple(array[start - first :] for array in part))
+        done.append(slice_of(transfer, tiling, rows, np.int32(first), size, shared))
+        starts.append(start - first)
         if start + size < blocks:
             yield None
-    samples, scales = (jnp.concatenate(some) for some in zip(*done, strict=True))
-    yield _tile_set(tiling, place, parts, diffuse, (samples, scales, *outline))
+    slices_ = zip(*done, strict=True)
+    samples, scales = (joined(some, tuple(starts), shared) for some in slices_)
+    yield _tile_set(tiling, place, parts, diffuse, (samples, scales, *outline), shared)
 
 
-def _tile_set(tiling, place, rule, diffuse, arranged) -> TileSet:
+def _placed(rule: LocalRule, transfer: Transfer, shared: Shared | None) -> tuple[Array, ...]:
+    dtype = transfer.positions.dtype
+    return tuple(on_each_device(np.asarray(part, dtype), shared) for part in rule)
+
+
+def _tile_set(tiling, place, rule, diffuse, arranged, shared) -> TileSet:
     samples, scales, at, basis, positions, normals = arranged
     return TileSet(
         tiling,
-        place=jnp.asarray(place),
+        place=place,
         samples=samples,
         scales=scales,
         directions=at,
@@ -260,6 +270,7 @@ def _tile_set(tiling, place, rule, diffuse, arranged) -> TileSet:
         positions=positions,
         normals=normals,
         diffuse=diffuse,
+        group=len(place) // (shared.parts if shared else 1),
     )
 
 
@@ -326,23 +337,20 @@ class Tiles(AbstractMethod):
         return tiles(light, eye, material, distant=self.distant, normalized=self.normalized)
 
 
-@functools.partial(jax.jit, static_argnames=("distant", "normalized"))
-def _shade_tiles(light, eye, material, tiles, distant, normalized):
-    tile, (blocks, size) = tiles.tiling.tile, tiles.tiling.permutation.shape
+@functools.partial(jax.jit, static_argnames=("distant", "normalized", "shared"))
+def _shade_tiles(light, eye, material, tiles, distant, normalized, shared):
     width, count, directions = tiles.basis.shape
-    basis = tiles.basis.reshape(width, -1)
-    lights = matmul(light, basis).reshape(3, count, directions)
-    weights = jnp.swapaxes(lights, 0, 1)[tile] * tiles.scales[:, None]
-
-    axis = mirrored(eye, tiles.positions, tiles.normals, distant).reshape(3, blocks, 1, size)
     zonal = phong(one_exponent(material, count), tiles.degree, normalized=normalized)
     lobe = matmul(tiles.powers, zonal)
-    values = materialize(_lobed, axis, tiles.directions[tile], lobe, tiles.lowest, tiles.samples)
-    glossy = materialize(block_sums, weights, values)
-    # Rows of four, since a gather of three takes one number at a time.
-    glossy = jnp.pad(jnp.swapaxes(glossy, 1, 2), ((0, 0), (0, 0), (0, 1))).reshape(-1, 4)
-    glossy = glossy.at[tiles.place].get(mode="promise_in_bounds")[:, :3]
-
+    rows = tiles.tiling.tile, tiles.place, tiles.samples, tiles.scales, tiles.directions
+    points = tiles.basis, tiles.positions, tiles.normals
+    glossy = on_rows(
+        functools.partial(_glossy, distant),
+        shared,
+        (None, None, None, None, 0, 1),
+        0,
+        *(light, eye, lobe, tiles.lowest, rows, points),
+    )
     albedo = material.specular
     albedo = albedo if albedo.ndim == 2 else albedo.reshape(1, -1)
     color = glossy * albedo + shade_diffuse(light, tiles.diffuse, material.diffuse)
@@ -351,6 +359,23 @@ def _shade_tiles(light, eye, material, tiles, distant, normalized):
     cost += sum_cost(degree, degree, directions, terms)
     cost += count * directions * 3 * width / len(tiles.place) / full_cost(degree)  # of the light
     return AdaptiveResult(color, {}, jnp.asarray(cost, color.dtype))
+
+
+def _glossy(distant, light, eye, lobe, lowest, rows, points):
+    """Computes the glossy part of the rows at hand."""
+    tile, place, samples, scales, at = rows
+    basis, positions, normals = points
+    (width, count, directions), (blocks, _, size) = basis.shape, samples.shape
+    tile, place = own(tile, count), own(place, blocks * size)
+    lights = matmul(light, basis.reshape(width, -1)).reshape(3, count, directions)
+    weights = jnp.swapaxes(lights, 0, 1)[tile] * scales[:, None]
+
+    axis = mirrored(eye, positions, normals, distant).reshape(3, blocks, 1, size)
+    values = materialize(_lobed, axis, at[tile], lobe, lowest, samples)
+    glossy = materialize(block_sums, weights, values)
+    # Rows of four, since a gather of three takes one number at a time.
+    glossy = jnp.pad(jnp.swapaxes(glossy, 1, 2), ((0, 0), (0, 0), (0, 1))).reshape(-1, 4)
+    return glossy.at[place].get(mode="promise_in_bounds")[:, :3]
 
 
 def _lobed(axis, directions, lobe, lowest, samples):

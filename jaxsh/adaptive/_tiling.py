@@ -12,7 +12,8 @@ from jaxtyping import Array, ArrayLike, Float, Int
 from .._core.checks import as_host_float, check_flag, check_size, check_type
 from ..transfer import Transfer
 from ..transfer._glossy_kernels import checked_eye, mirrored, rows_of
-from ._method import check_known, check_one_device
+from ._method import check_known
+from ._sharing import made_of_rows, sharing
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 128
@@ -24,7 +25,8 @@ class Tiling(eqx.Module):
 
     `permutation` names the vertex at each place, the last vertex again where a block must be
     filled up; `tile` is the tile of each block, ascending. `axes` are where a tile's vertices
-    mirror the eye, on average.
+    mirror the eye, on average. Where several devices share the vertices, each has blocks and tiles
+    of its own vertices, one device after the other.
 
     **Example**
 
@@ -68,28 +70,33 @@ def make_tiling(
     check_type("transfer", transfer, Transfer)
     distant = check_flag("distant", distant)
     num_tiles, block = check_size("num_tiles", num_tiles), check_size("block", block)
-    check_one_device("make_tiling", transfer)
     check_known("make_tiling", transfer, eye)
     eye = checked_eye(eye, transfer.positions.dtype)
-    axis, units = _mirrored(eye, transfer.positions, transfer.normals, distant)
-    axis = np.asarray(axis, np.float32)
-    facing = np.sum(np.asarray(units) * axis, axis=0)
-    areas = vertex_areas(transfer) if areas is None else as_host_float(areas, "areas")
+    if areas is None:
+        areas = vertex_areas(transfer)
+    elif not isinstance(areas, Array):
+        areas = jnp.asarray(as_host_float(areas, "areas"))
     if areas.shape != (transfer.num_points,):
         raise ValueError(f"expected areas ({transfer.num_points},), got shape {areas.shape}")
-    weights = areas * (np.maximum(facing, 0) + 0.05)
-    blocks, last = -(-len(weights) // block), len(weights) - 1
-    # What fills the last block up weighs nothing.
-    spare = blocks * block - len(weights)
-    weights, axis = np.pad(weights, (0, spare)), np.pad(axis, ((0, 0), (0, spare)), mode="edge")
-    tiles = _split(axis.T, weights, np.arange(len(weights)), min(num_tiles, blocks), block)
-    sizes = [len(tile) // block for tile in tiles]
-    axes = [_towards(weights[tile] @ axis.T[tile]) for tile in tiles]
-    return Tiling(
-        jnp.asarray(np.minimum(np.concatenate(tiles), last).reshape(-1, block).astype(np.int32)),
-        jnp.asarray(np.repeat(np.arange(len(tiles), dtype=np.int32), sizes)),
-        jnp.asarray(np.stack(axes), transfer.positions.dtype),
-    )
+    shared = sharing(transfer.coefficients)
+    axis, units = _mirrored(eye, transfer.positions, transfer.normals, distant)
+
+    def split(part, axis, units, areas):
+        axis, first = axis.astype(np.float32).T, part * len(axis)
+        facing = np.sum(units.T * axis, axis=0)
+        weights = areas * (np.maximum(facing, 0) + 0.05)
+        blocks, last = -(-len(weights) // block), len(weights) - 1
+        # What fills the last block up weighs nothing.
+        spare = blocks * block - len(weights)
+        weights, axis = np.pad(weights, (0, spare)), np.pad(axis, ((0, 0), (0, spare)), mode="edge")
+        tiles = _split(axis.T, weights, np.arange(len(weights)), min(num_tiles, blocks), block)
+        sizes = [len(tile) // block for tile in tiles]
+        axes = np.stack([_towards(weights[tile] @ axis.T[tile]) for tile in tiles])
+        order = np.minimum(np.concatenate(tiles), last).reshape(-1, block) + first
+        tile = np.repeat(np.arange(len(tiles)), sizes) + part * len(tiles)
+        return order.astype(np.int32), tile.astype(np.int32), axes.astype(units.dtype)
+
+    return Tiling(*made_of_rows(split, shared, axis.T, units.T, areas))
 
 
 @functools.partial(jax.jit, static_argnames="distant")
@@ -130,11 +137,20 @@ def _split(axis, weights, vertices, count, block) -> list[np.ndarray]:
     return [members for *_, members, _ in queue]
 
 
-def vertex_areas(transfer: Transfer) -> Float[np.ndarray, " v"]:
-    """Estimates areas by the mean squared length of a vertex's edges, relative to all vertices'."""
-    points, neighbors = np.asarray(transfer.positions), np.asarray(transfer.neighbors)
-    real = neighbors != np.arange(len(points))[:, None]
-    squares = np.sum((points[neighbors] - points[:, None]) ** 2, axis=(1, 2))
-    areas = squares / np.maximum(real.sum(axis=1), 1)
-    mean = areas.mean()
-    return np.maximum(areas / mean, 1e-3) if mean > 0 else np.ones_like(areas)
+def vertex_areas(transfer: Transfer) -> Float[Array, " v"]:
+    """Estimates areas by the mean squared length of a vertex's edges, relative to all vertices'.
+
+    Where devices share the vertices, of edges between those of the same device.
+    """
+
+    def estimate(part, points, neighbors):
+        numbers = np.arange(len(points))[:, None]
+        neighbors = neighbors - part * len(points)
+        near = np.where((neighbors >= 0) & (neighbors < len(points)), neighbors, numbers)
+        squares = np.sum((points[near] - points[:, None]) ** 2, axis=(1, 2))
+        areas = squares / np.maximum((near != numbers).sum(axis=1), 1)
+        mean = areas.mean()
+        return (np.maximum(areas / mean, 1e-3) if mean > 0 else np.ones_like(areas),)
+
+    shared = sharing(transfer.coefficients)
+    return made_of_rows(estimate, shared, transfer.positions, transfer.neighbors)[0]

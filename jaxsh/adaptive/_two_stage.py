@@ -14,9 +14,10 @@ from ..transfer import AbstractTransfer, Material, SampledTransfer
 from ..transfer._glossy_kernels import lobe_polynomial, lobe_products, mirrored, reflection
 from ._filter import Filter, albedos, threshold
 from ._levels import AbstractFilter
-from ._method import check_one_device, checked_frame, plain_transfer
+from ._method import check_neighbors, checked_frame, plain_transfer
 from ._regions import compacted, grow, seen_as_changed, smooth
 from ._result import AdaptiveResult, product_cost, sum_cost
+from ._sharing import axes_of, material_axes, on_rows, sharing
 from ._staged import StagedTransfer, row_products, stage
 
 
@@ -44,8 +45,8 @@ class TwoStage(AbstractFilter):
     recomputed, which is not so at the paper's threshold. Experiment `leekim2014.table1` prints
     both.
 
-    Raises `ValueError` for shapes and options that do not fit, for degrees that were not staged,
-    and for arrays on several devices, since it gathers vertices from all over the mesh.
+    Where several devices share the vertices, each recomputes its own. Raises `ValueError` for
+    shapes and options that do not fit, and for degrees that were not staged.
 
     **Example**
 
@@ -67,7 +68,6 @@ class TwoStage(AbstractFilter):
         eye: Float[ArrayLike, " 3"],
         material: Material,
     ) -> AdaptiveResult:
-        check_one_device("TwoStage", transfer)
         plain = plain_transfer("two_stage", transfer)
         light, eye, material = checked_frame(light, plain, eye, material)
         settings = self.settings(light, 0.0)
@@ -84,17 +84,52 @@ class TwoStage(AbstractFilter):
                 f"{staged.degrees}, got {wanted}"
             )
         previous = self.remembered(plain.num_points)
-        return _two_stage(light, staged, eye, material, settings, previous)
+        if self.rings or self.smoothing:
+            check_neighbors("TwoStage", plain)
+        shared = sharing(staged.rows.samples)
+        return _two_stage(light, staged, eye, material, settings, previous, shared)
 
 
-@jax.jit
-def _two_stage(light, staged, eye, material, settings: Filter, previous):
-    transfer, (base, middle, target) = staged.transfer, staged.degrees
-    count = staged.num_points
-    axis = mirrored(eye, staged.base.positions, staged.base.normals, settings.distant)
-    normals = staged.base.normal_rows()
+@functools.partial(jax.jit, static_argnames="shared")
+def _two_stage(light, staged, eye, material, settings: Filter, previous, shared):
+    base, middle, target = staged.degrees
+    count, dtype = staged.num_points, light.dtype
+    sampled = (2, 0, 1, 1)
+    glossy, recomputed, region = on_rows(
+        functools.partial(_glossy, shared.names if shared else None),
+        shared,
+        (
+            *(None, None, None, material_axes(material), 0, 0),
+            *(axes_of(staged.base, *sampled), axes_of(staged.middle, *sampled)),
+            axes_of(staged.rows, 0, None),
+        ),
+        (1, 0, 0),
+        *(light, eye, settings, material, previous),
+        *(staged.transfer.neighbors, staged.base, staged.middle, staged.rows),
+    )
+    albedo = albedos(material.diffuse, material.specular, count)["diffuse"]
+    color = glossy + albedo * staged.diffuse.irradiances(light).T
+
+    shown = middle if settings.fallback == "level" else base
+    degrees = jnp.where(region, jnp.asarray(target, jnp.int32), jnp.asarray(shown, jnp.int32))
+    stages = [sum_cost(degree, target) for degree in (base, middle)]
+    return AdaptiveResult(
+        color=color.T,
+        active_fraction={"specular": jnp.mean(recomputed, dtype=dtype)},
+        relative_cost=sum(stages)
+        + product_cost("diffuse", 0, target, target)
+        + sum_cost(target, target) * jnp.mean(region, dtype=dtype),
+        shown_degree={"specular": degrees, "diffuse": jnp.full(count, target, jnp.int32)},
+    )
+
+
+def _glossy(names, light, eye, settings, material, previous, neighbors, base, middle, rows):
+    """Computes the glossy part of the rows at hand, who is recomputed, and who with the rings."""
+    count, target = len(neighbors), degree_of(light.shape[-1])
+    axis = mirrored(eye, base.positions, base.normals, settings.distant)
+    normals = base.normal_rows()
     see = functools.partial(reflection, material, axis, normals, normalized=settings.normalized)
-    albedo = albedos(material.diffuse, see(target)[1], count)
+    specular = albedos(material.diffuse, see(target)[1], count)["specular"]
 
     def lobes(degree):
         return lobe_polynomial(see(degree)[0])
@@ -103,34 +138,23 @@ def _two_stage(light, staged, eye, material, settings: Filter, previous):
         lights = light[:, : num_coefficients(sampled.degree)]
         return lobe_products(lights, sampled, axis, lobes(sampled.degree))
 
-    def second(rows):
-        return row_products(light, staged.rows, axis, lobes(target), rows)
+    full = lobes(target)
 
-    basic, first = everyone(staged.base), everyone(staged.middle)
-    region = materialize(
+    def in_full(vertices):
+        return row_products(light, rows, axis, full, vertices)
+
+    basic, first = everyone(base), everyone(middle)
+    chosen = region = materialize(
         seen_as_changed,
         jax.lax.stop_gradient(first - basic),
         threshold("specular", target, settings, previous, count),
-        jax.lax.stop_gradient(settings.exposure * albedo["specular"]),
+        jax.lax.stop_gradient(settings.exposure * specular),
     )
-    recomputed = jnp.mean(region, dtype=basic.dtype)
     if settings.rings:
         # All changes are known, and those that are seen are inside already: whole rings join.
-        region = grow(region, transfer.neighbors, lambda fringe: fringe, settings.rings)
-    rest, shown = (first, middle) if settings.fallback == "level" else (basic, base)
-    glossy = jnp.where(region[None], compacted(second, region), rest)
+        region = grow(region, neighbors, lambda fringe: fringe, settings.rings, names)
+    rest = first if settings.fallback == "level" else basic
+    glossy = jnp.where(region[None], compacted(in_full, region), rest)
     if settings.smoothing:
-        glossy = basic + smooth(glossy - basic, region, transfer.neighbors)
-    irradiance = staged.diffuse.irradiances(light).T
-    color = albedo["specular"] * glossy + albedo["diffuse"] * irradiance
-
-    degrees = jnp.where(region, jnp.asarray(target, jnp.int32), jnp.asarray(shown, jnp.int32))
-    stages = [sum_cost(one.degree, target) for one in (staged.base, staged.middle)]
-    return AdaptiveResult(
-        color=color.T,
-        active_fraction={"specular": recomputed},
-        relative_cost=sum(stages)
-        + product_cost("diffuse", 0, target, target)
-        + sum_cost(target, target) * jnp.mean(region, dtype=basic.dtype),
-        shown_degree={"specular": degrees, "diffuse": jnp.full(count, target, jnp.int32)},
-    )
+        glossy = basic + smooth(glossy - basic, region, neighbors, names)
+    return specular * glossy, chosen, region

@@ -1,24 +1,23 @@
-"""The adaptive methods on a mesh of devices: they shard, or say why they do not."""
+"""The adaptive methods on a mesh of devices: each device works on its own vertices."""
 
+import dataclasses
+
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from balls import WIDTH, shadowed_ball
 from jax.sharding import NamedSharding
-from sharding import ROWS, WHOLE, P, check_sharded
+from sharding import ROWS, WHOLE, P, check_sharded, collectives
 
-from jaxsh import adaptive
+from jaxsh import adaptive, transfer
 from jaxsh.transfer import Material, Transfer
 
 V, DEGREE, K = 16, 3, 16
-METHODS = [
-    adaptive.Levels(rings=1),
-    adaptive.TwoStage(),
-    adaptive.Anchors(),
-    adaptive.Tiles(),
-    adaptive.Masks(rings=1),
-    adaptive.Masks(smoothing=True),
-]
+EYE = np.array([0.5, -3.0, 1.0])
+# What rings and smoothing tell the other devices, and shares of all vertices.
+EXCHANGE = {"all-gather": "who is inside, and colors", "all-reduce": "whether anyone joined"}
 
 
 @pytest.fixture
@@ -28,7 +27,9 @@ def frame(rng):
 
     points = jnp.asarray(rng.normal(size=(V, 3)), np.float32)
     decay = jnp.asarray((1 + np.sqrt(np.arange(K))) ** -2, np.float32)
-    made = Transfer(array(V, K) * decay[None], points, points, jnp.zeros((V, 1), np.int32))
+    # Of the first four neighbors one is on the other device.
+    ring = (np.arange(V)[:, None] + np.array([-1, 1, 8])) % V
+    made = Transfer(array(V, K) * decay[None], points, points, jnp.asarray(ring, np.int32))
     eye = jnp.asarray([0.3, -2.0, 1.5], np.float32)
     return array(3, K), made, eye, Material(array(V, 3), array(V, 1), 10 * array(V))
 
@@ -73,37 +74,136 @@ def test_levels_shares_are_means_over_devices(frame, kind):
     np.testing.assert_allclose(found.relative_cost, expected.relative_cost, rtol=1e-6)
 
 
-def sharded(tree):
-    mesh = jax.make_mesh((2,), ("rows",), axis_types=(jax.sharding.AxisType.Auto,))
-    return jax.device_put(tree, NamedSharding(mesh, P("rows")))
+NEAR = [
+    adaptive.Levels(rings=1, smoothing=True, threshold=0.01, base=1),
+    pytest.param(
+        adaptive.Masks(rings=V, smoothing=True, threshold=0.01, base=1), marks=pytest.mark.slow
+    ),
+    pytest.param(
+        adaptive.TwoStage(rings=1, smoothing=True, threshold=0.02, fallback="base"),
+        marks=pytest.mark.slow,
+    ),
+]
 
 
-@pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
-def test_methods_that_gather_refuse_several_devices(frame, method, unchecked):
-    light, made, eye, material = frame
-    made, material = sharded(made), Material(material.diffuse, material.specular, 8.0)
-
-    def color(made):
+@pytest.mark.parametrize("method", NEAR, ids=lambda method: type(method).__name__)
+def test_rings_and_smoothing_reach_other_devices(frame, method):
+    def color(light, made, eye, material):
         return adaptive.shade(light, made, eye, material, method).color
 
-    for call in (color, jax.jit(color)):
-        with pytest.raises(
-            ValueError, match=r"gathers vertices .* take Masks\(\)|looks at the val"
-        ):
-            call(made)
-    with pytest.raises(ValueError, match=r"gathers vertices .* take Masks\(\)"):
-        color(made)
+    plain = adaptive.shade(*frame, dataclasses.replace(method, rings=0, smoothing=False)).color
+    assert np.any(np.abs(color(*frame) - plain) > 1e-3)
+    check_sharded(color, frame, (WHOLE, ROWS, WHOLE, ROWS), ROWS, mapped=False, exchange=EXCHANGE)
 
 
-def test_sets_are_made_of_one_device_s_arrays(frame):
-    made = sharded(frame[1])
-    for make in (
-        adaptive.stage,
-        adaptive.make_anchors,
-        lambda made: adaptive.make_tiling(made, frame[2]),
-        lambda made: adaptive.make_tiles(made, frame[2]),
-        lambda made: adaptive.arrange(made, adaptive.make_tiling(frame[1], frame[2])),
-        lambda made: adaptive.make_tile_atlas(made, views=1),
-    ):
-        with pytest.raises(ValueError, match="gathers vertices from all over the mesh"):
-            make(made)
+def test_neighbors_are_out_of_reach_inside_shard_map(frame):
+    placed = jax.device_put(frame[1], NamedSharding(mesh_of("Auto"), ROWS))
+    for method in (adaptive.Masks(rings=1), adaptive.TwoStage(smoothing=True)):
+
+        def color(made, method=method):
+            return adaptive.shade(frame[0], made, frame[2], Material(0.5, 0.5, 8.0), method).color
+
+        inside = jax.shard_map(color, mesh=mesh_of("Auto"), in_specs=ROWS, out_specs=ROWS)
+        with pytest.raises(ValueError, match=r"looks at neighbors, .* outside shard_map"):
+            jax.eval_shape(inside, placed)
+
+
+@pytest.mark.parametrize(
+    "kind", ["Explicit", pytest.param("Auto", marks=pytest.mark.slow)], ids=str.lower
+)
+def test_stages_of_each_device_are_those_of_one(frame, kind):
+    """Staged there, and shared out when that was done: the same arrays, and nothing exchanged."""
+    light, made, eye, _ = frame
+    material, method = Material(0.5, 0.5, 8.0), adaptive.TwoStage(threshold=0.02, fallback="base")
+
+    @jax.jit
+    def color(light, made):
+        return adaptive.shade(light, made, eye, material, method).color
+
+    mesh, staged = mesh_of(kind), adaptive.stage(made)
+    expected = adaptive.shade(light, staged, eye, material, method)
+    assert set(np.asarray(expected.shown_degree["specular"])) == {2, DEGREE}
+    shared = adaptive.stage(made.sharded(mesh))
+    jax.tree.map(np.testing.assert_array_equal, shared, staged.sharded(mesh))
+    compiled = color.lower(light, shared).compile()
+    assert collectives(compiled) == {}
+    for one in (shared, staged.sharded(mesh)):
+        shown = compiled(light, one)
+        assert shown.sharding.spec[0] == "rows"
+        np.testing.assert_allclose(shown, expected.color, rtol=0, atol=1e-6)
+
+
+def mesh_of(kind):
+    kind = getattr(jax.sharding.AxisType, kind)
+    return jax.make_mesh((2,), ("rows",), axis_types=(kind,))
+
+
+def make_anchors(made):
+    return adaptive.make_anchors(made, quantized=False)
+
+
+def make_tiles(made):
+    return adaptive.make_tiles(made, EYE, num_tiles=8, block=8, directions=20, quantized=False)
+
+
+@pytest.mark.parametrize(
+    "kind", ["Explicit", pytest.param("Auto", marks=pytest.mark.slow)], ids=str.lower
+)
+@pytest.mark.parametrize("make", [make_anchors, make_tiles])
+def test_each_device_has_a_set_of_its_own_vertices(rng, make, kind):
+    """As exact as on one device, without a word to the other, and as good on one device after."""
+    ball, light = shadowed_ball(rng), rng.normal(size=(3, WIDTH))
+    material = Material(0.0, 1.0, 8.0)
+
+    def color(light, made, eye):
+        return made(light, eye, material).color
+
+    shade = jax.jit(color)
+    full = transfer.shade_glossy(light, ball, EYE, material)
+    made = make(ball.sharded(mesh_of(kind)))
+    compiled = shade.lower(light, made, EYE).compile()
+    assert collectives(compiled) == {}
+    shown = compiled(light, made, EYE)
+    assert shown.sharding.spec[0] == "rows"
+    one, two = (np.sqrt(np.mean((x - full) ** 2)) for x in (shade(light, make(ball), EYE), shown))
+    assert 0 < two <= one
+    moved = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)), made)
+    np.testing.assert_allclose(shade(light, moved, EYE), shown, rtol=0, atol=1e-14)
+
+
+def test_sets_that_are_shared_otherwise_are_refused(frame):
+    light, made, eye, _ = frame
+    material = Material(0.5, 0.5, 8.0)
+    mesh = mesh_of("Auto")
+    anchors = jax.device_put(make_anchors(made), NamedSharding(mesh, P()))
+    anchors(light, eye, material)  # on each device in full
+    placed = eqx.tree_at(
+        lambda one: one.rows.samples,
+        anchors,
+        jax.device_put(anchors.rows.samples, NamedSharding(mesh, ROWS)),
+    )
+    with pytest.raises(ValueError, match=r"8 vertices on each device, got one .* groups of 16"):
+        placed(light, eye, material)
+    tiling = adaptive.make_tiling(made, eye, num_tiles=2, block=4)
+    with pytest.raises(ValueError, match="tiling of 8 vertices on each device"):
+        adaptive.arrange(made.sharded(mesh), tiling)
+    with pytest.raises(ValueError, match="a transfer that 2 devices share, got 1 blocks"):
+        adaptive.arrange(made.sharded(mesh), adaptive.make_tiling(made, eye, block=16))
+    with pytest.raises(ValueError, match="at least 4 vertices on each device, got 3"):
+        make_anchors(jax.tree.map(lambda leaf: leaf[:6], made).sharded(mesh))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slices", [1, 3])
+def test_an_atlas_of_each_device_is_followed(rng, slices):
+    ball = shadowed_ball(rng).sharded(mesh_of("Auto"))
+    atlas = adaptive.make_tile_atlas(ball, views=2, num_tiles=4, block=16, directions=20)
+    start, end = atlas.eyes
+    follow = adaptive.TileFollower(atlas, ball, start, slices=slices)
+    for _ in range(slices + 1):
+        jax.block_until_ready(follow(end))
+    expected = atlas.nearest(ball, end)
+    jax.block_until_ready(expected)
+    for one, other in zip(jax.tree.leaves(follow(end)), jax.tree.leaves(expected), strict=True):
+        assert one.sharding.is_equivalent_to(other.sharding, one.ndim)
+        np.testing.assert_array_equal(one, other)

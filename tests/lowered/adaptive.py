@@ -36,6 +36,7 @@ def anchor_set(made):
         adaptive._staged.sample_rows(made.coefficients, DEGREE),
         adaptive._anchors.sample(made, 1),
         adaptive._staged.diffuse_part(made, None, True),
+        V,
     )
 
 
