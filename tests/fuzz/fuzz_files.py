@@ -22,8 +22,23 @@ def _transfer() -> list[bytes]:
             "normals": np.tile(np.array([0, 0.6, 0.8], kind), (5, 1)),
             "neighbors": np.arange(10).reshape(5, 2).astype("<i4") % 5,
         }
-        files.append(archive({f"{name}.npy": npy(array) for name, array in arrays.items()}))
-    return files
+        files.append(arrays)
+    clusters = {
+        "format": np.array("jaxsh compressed transfer"),
+        "version": np.array(2),
+        "surface": np.array("points"),
+        "cosine": np.array(True),
+        "weights": (np.arange(10, dtype="i1") - 5).reshape(2, 5),
+        "cluster": np.arange(5, dtype="u1") % 2,
+        "codes": np.arange(24, dtype="<i2").reshape(2, 3, 4),
+        "scales": np.arange(1, 7, dtype="<f4").reshape(2, 3) / 8,
+    }
+    files.append(
+        clusters | {name: files[0][name] for name in ("positions", "normals", "neighbors")}
+    )
+    return [
+        archive({f"{name}.npy": npy(array) for name, array in arrays.items()}) for arrays in files
+    ]
 
 
 _MAKERS = fuzz_meshes.MAKERS | fuzz_pictures.MAKERS | {"npz": _transfer} | fuzz_lights.MAKERS

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,8 +16,10 @@ from jaxsh.transfer import (
     bake,
     compress,
     fluence,
+    load,
     open,
     quantize,
+    save,
     shade_diffuse,
     shade_glossy,
 )
@@ -209,3 +212,37 @@ def test_what_cannot_be_compressed_is_refused(made):
         jax.jit(compress)(made)
     with pytest.raises(TypeError, match="transfer"):
         compress(quantize(made))  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_file_gives_back_every_bit(small, dtype, tmp_path):
+    arrays = {name: getattr(small, name).astype(dtype) for name in ("scales", *ARRAYS[1:3])}
+    given = dataclasses.replace(small, **arrays, surface="texels")
+    assert eqx.tree_equal(load(save(tmp_path / "a.npz", given)), given)
+
+
+def changed(small, path, **changes):
+    path = save(path, small)
+    arrays = dict(np.load(path)) | changes
+    np.savez(path, **{name: array for name, array in arrays.items() if array is not None})
+    return path
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"version": np.array(1)}, "written as version 1, but this jaxsh reads 2"),
+        ({"codes": None}, "damaged: it holds no codes"),
+        ({"weights": np.zeros((2, V), np.int16)}, "damaged: weights have dtype int16"),
+        ({"cluster": np.full(V, 3, np.uint8)}, "damaged: cluster does not name one of 3 for each"),
+        ({"cluster": np.zeros(V - 1, np.uint8)}, "damaged: cluster does not name one of 3"),
+        ({"weights": np.zeros((3, V), np.int8)}, "damaged: scales and codes are not those of 3"),
+        ({"scales": np.full((3, 3), np.inf)}, "damaged: 9 of 9 scales are NaN or infinite"),
+        ({"codes": np.zeros((3, 3, 8), np.int16)}, "damaged: .* got 8"),
+        ({"normals": np.zeros((3, 3))}, "damaged: positions or normals are not"),
+    ],
+)
+def test_other_archives_are_refused(small, tmp_path, changes, message):
+    path = changed(small, tmp_path / "a.npz", **changes)
+    with pytest.raises(ValueError, match=rf"a\.npz: {message}"):
+        load(path)
