@@ -9,7 +9,7 @@ import lowered.loops
 import numpy as np
 import pytest
 
-from jaxsh.geometry import JaxRayScene, Mesh, _cast, knot, ray_scene, vertex_normals
+from jaxsh.geometry import JaxRayScene, Mesh, Points, _cast, knot, ray_scene, vertex_normals
 from jaxsh.transfer import bake
 from jaxsh.transfer._bake import _chunk, _device, _passes
 from jaxsh.transfer._bake._directions import guided, turned_fibonacci
@@ -65,6 +65,18 @@ def test_agrees_in_either_precision_and_where_all_directions_are_guides(
     got = baked(mesh, device=True, **options)
     assert got.dtype == kind
     assert relative(got, baked(mesh, device=False, **options)) < tolerance
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:bake. .* of .* points see nothing")
+def test_points_and_volumes_agree_with_the_host():
+    """Of a volume all directions count alike, which a last chunk that is filled up must not do."""
+    points = Points(1.3 * MESH.vertices[:200], MESH.normals[:200])
+    for surface in (points, Points(points.positions)):
+        options = {"scene": MESH, "bounces": 1}
+        got, host = (baked(surface, device=device, **options) for device in (True, False))
+        assert relative(got, host) < 1e-7
+        assert np.abs(host).max() > 1
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import bodies
 import numpy as np
 import pytest
 
-from jaxsh.geometry import knot
+from jaxsh.geometry import Points, knot
 from jaxsh.transfer import bake, bake_on
 from jaxsh.transfer._bake import _worker
 from jaxsh.transfer._bake._kept import BakeStore
@@ -44,6 +44,19 @@ def test_a_cluster_gives_the_bits_of_one_process(tmp_path, client):
     assert stored.num_points == 700
     assert not _worker._held  # the tree is let go of
     assert not client.who_has()
+
+
+def test_points_under_a_mesh_have_the_bits_of_one_process(tmp_path, client):
+    """Of a volume, with the bounces of a mesh that is baked first, in blocks of its own."""
+    some, folder = Points(1.4 * MESH.vertices[:100]), tmp_path / "points"
+    options = ALIKE | {"bounces": 1, "scene": MESH}
+    with pytest.warns(UserWarning, match="of 100 points see nothing") as said:
+        expected = bake(some, DEGREE, **options)
+    with pytest.warns(UserWarning, match="of 100 points see nothing") as again:
+        stored = bake_on(client, some, DEGREE, store=folder, **options)
+    assert [str(one.message) for one in said] == [str(one.message) for one in again]
+    np.testing.assert_array_equal(rows(folder), expected.coefficients)
+    assert (stored.num_points, stored.surface, stored.cosine) == (100, "points", False)
 
 
 @pytest.mark.slow

@@ -124,7 +124,7 @@ class DeviceJob(Job):
         self,
         bounce: bool,
         rows: slice,
-        before: Float[np.ndarray, "v k"] | None = None,
+        before: Float[np.ndarray, "m k"] | None = None,
         direct: Float[np.ndarray, "rows k"] | None = None,
     ) -> Float[np.ndarray, "rows k"]:
         """Compute what `Job.rows` does, and wait for it."""
@@ -140,7 +140,7 @@ class DeviceJob(Job):
         self,
         bar: Any,
         bounce: bool,
-        before: Float[Array, "v k"] | None = None,
+        before: Float[Array, "m k"] | None = None,
         direct: Float[Array, "v k"] | None = None,
     ) -> Float[Array, "v k"]:
         """Compute what `Job.rows` does of all points; it stays on the device."""

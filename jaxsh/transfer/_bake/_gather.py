@@ -78,7 +78,7 @@ def bounced(
     vectors: Float[np.ndarray, "d 3"],
     surface: Faces,
     share: Float[np.ndarray, " v_or_1"],
-    before: Float[np.ndarray, "v k"],
+    before: Float[np.ndarray, "m k"],
     rows: slice,
 ) -> Float[np.ndarray, "rows k"]:
     """Sum w max(0, n·ω) share · before over the rays that meet the front of a face of the mesh.

@@ -131,7 +131,7 @@ class Job:
         self,
         bounce: bool,
         rows: slice,
-        before: Float[np.ndarray, "v k"] | None = None,
+        before: Float[np.ndarray, "m k"] | None = None,
         direct: Float[np.ndarray, "rows k"] | None = None,
     ) -> Float[np.ndarray, "rows k"]:
         """Compute the coefficients of the points in a slice: of direct light, or after a bounce.

@@ -197,7 +197,8 @@ def refuse(path: Path, identity: dict[str, Any]) -> None:
 def differing(found: dict[str, Any], identity: dict[str, Any]) -> str | None:
     """Name the first argument in which a store is another bake's; None where it is this one's."""
     found = USUAL | found
-    return next((name for name, value in identity.items() if found.get(name) != value), None)
+    names = ("surface", "cosine", *identity)  # what says most, first
+    return next((name for name in names if found.get(name) != identity[name]), None)
 
 
 def neighbors_of(surface: Surface) -> Int[Array | np.ndarray, "v n"]:
