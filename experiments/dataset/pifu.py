@@ -33,9 +33,9 @@ class Config:
     """PIFu's bake draws the square of it"""
     chosen: int = 2000
     """vertices at which errors are measured"""
-    reference: int = 65_536
+    reference: int = 32_768
     """directions of the reference"""
-    draws: int = 4
+    draws: int = 3
     """seeds over which errors are averaged"""
     rounds: int = 3
     """bakes of each kind, in turn"""

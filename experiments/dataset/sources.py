@@ -37,10 +37,10 @@ def environment(context: Context, name: str) -> Float[Array, "h w 3"]:
         raise UserError(" ".join(str(error).split())) from error
 
 
-# Radius and height of the vase from the middle of its foot over the rim to the middle of its floor.
+# Radius and height of the vase from near the middle of its foot over the rim to that of its floor.
 _PROFILE = [
-    *((0.001, 0), (0.28, 0), (0.31, 0.03), (0.44, 0.35), (0.33, 0.75), (0.27, 0.9), (0.34, 1.0)),
-    *((0.31, 1.005), (0.24, 0.9), (0.29, 0.75), (0.39, 0.35), (0.25, 0.06), (0.001, 0.05)),
+    *((0.02, 0), (0.28, 0), (0.31, 0.03), (0.44, 0.35), (0.37, 0.7), (0.33, 0.86), (0.41, 0.97)),
+    *((0.39, 0.975), (0.3, 0.86), (0.33, 0.7), (0.38, 0.5), (0.25, 0.36), (0.02, 0.34)),
 ]
 _FLUTES = 12
 
