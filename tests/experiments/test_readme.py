@@ -23,9 +23,11 @@ def test_every_experiment_is_in_a_command_and_every_command_is_there():
     commands = re.findall(r"experiments run ([\w. ]+?)(?= --preset|`|\n)", TEXT)
     named = {name for command in commands for name in command.split()}
     assert named <= set(entries())
-    # No table or figure of a paper: numbers that are inputs of the package, and what devices do.
-    devices = {name for name, entry in entries().items() if entry.path.parent.name == "devices"}
-    assert set(entries()) - named <= devices | {"inverse.prior"}
+    # No table or figure of a paper: numbers that are inputs of the package, what devices do, and
+    # what is made of the user's surfaces.
+    folders = {"devices", "dataset", "surfaces"}
+    others = {name for name, entry in entries().items() if entry.path.parent.name in folders}
+    assert set(entries()) - named <= others | {"inverse.prior"}
 
 
 def measured(name):
