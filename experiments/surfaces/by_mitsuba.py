@@ -4,6 +4,7 @@ Nothing is shared with ours but the GLB file itself: trimesh reads it, y up, and
 Mitsuba's own reader as an OBJ.
 """
 
+import importlib
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from ..runner import UserError
 def mitsuba() -> Any:
     """Mitsuba on the CPU, without LLVM."""
     try:
-        import mitsuba as mi
+        mi = importlib.import_module("mitsuba")
     except ImportError:
         raise UserError(
             "this experiment renders with Mitsuba: pip install mitsuba (the extra hosek has it)"
@@ -39,14 +40,7 @@ def scene(
         "fov": float(camera.fov_y),
         "fov_axis": "y",
         "to_world": mi.ScalarTransform4f().look_at(
-            **{
-                name: _y_up(getattr(camera, attribute))
-                for name, attribute in (
-                    ("origin", "position"),
-                    ("target", "target"),
-                    ("up", "up"),
-                )
-            }
+            origin=_y_up(camera.position), target=_y_up(camera.target), up=_y_up(camera.up)
         ),
         "film": {
             "type": "hdrfilm",
@@ -84,8 +78,7 @@ def as_envmap(environment: Float[np.ndarray, "h w 3"]) -> Float[np.ndarray, "h w
 
 
 def _mesh(mi: Any, glb: Path) -> Any:
-    import trimesh
-
+    trimesh: Any = importlib.import_module("trimesh")
     [part] = trimesh.load(glb, process=False).dump()
     material = part.visual.material
     picture = np.asarray(material.baseColorTexture.convert("RGB"))

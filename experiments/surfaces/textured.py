@@ -64,7 +64,7 @@ class _Subject(NamedTuple):
 @experiment("surfaces.textured")
 def run(config: Textured, context: Context) -> Table:
     """PSNR of a textured mesh against Mitsuba's direct lighting."""
-    names = config.environments or context.data.environments()
+    names, top = config.environments or context.data.environments(), max(config.degrees)
     with tempfile.TemporaryDirectory() as folder:
         subject = _subject(config, context, Path(folder) / "knot.glb")
         sheet = []
@@ -76,7 +76,6 @@ def run(config: Textured, context: Context) -> Table:
                 for row, image in _compared(config, subject, picture, halves):
                     context.record({"environment": name, "light": light, **row})
                     ours[row["color"], row["degree"]] = image
-                top = max(config.degrees)
                 sheet.append(
                     _panels(f"{name}, {light}", ours["texture", top], halves, subject.raster)
                 )
@@ -109,8 +108,9 @@ def _lights(config: Textured, context: Context, name: str) -> dict[str, Float[np
     whole = imaging.studio() if made else context.data.environment(name)
     # Of the size of the blurred one: Mitsuba looks rows up a little differently at the poles.
     height, width = 128, 256
-    soft = sphere.project_lat_long(whole, config.soft) * harmonics.window("hann", config.soft)
-    blurred = sphere.reconstruct_lat_long(soft, height, width)
+    light = sphere.project_lat_long(whole, config.soft)
+    light = light * harmonics.window("hann", config.soft).astype(light.dtype)[None]
+    blurred = sphere.reconstruct_lat_long(light, height, width)
     return {"soft": np.maximum(np.asarray(blurred), 0), "whole": np.asarray(whole)}
 
 

@@ -27,8 +27,8 @@ def write_glb(path: Path, vertices: int, size: int) -> Path:
     grid = np.concatenate([np.stack(face, axis=1) for face in faces]).astype(np.int32)
     mesh = dataclasses.replace(
         plain,
-        vertices=plain.vertices[same],
-        normals=plain.normals[same],
+        vertices=jnp.asarray(np.asarray(plain.vertices)[same]),
+        normals=jnp.asarray(np.asarray(plain.normals)[same]),
         faces=jnp.asarray(grid),
         uv=jnp.asarray(uv, jnp.float32),
         face_material=jnp.zeros(len(grid), jnp.int32),

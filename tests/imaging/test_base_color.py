@@ -78,6 +78,7 @@ def textured(**fields):
     )
 
 
+@pytest.mark.slow
 def test_base_color_is_factor_times_texture_times_vertex_color(raster):
     mesh = textured()
     found = base_color(mesh, raster)
