@@ -95,9 +95,10 @@ def bake(
     (`surface`, `cosine`, `belongs_to`); points and texels have no neighbors. On one machine a seed
     gives the same bits whatever the chunk, the number of threads and the interruptions.
 
-    The face under a texel stops rays of its own that lie above the normal's horizon and below the
-    face's: where normals are far from their faces', as on coarse meshes, light from the side is
-    lost between the vertices. Points a little inside the mesh see nothing: give an `offset`.
+    Rays of texels start off the curved surface that the normals of their face's vertices tell of,
+    where that lies above the face (Hanika 2021, "Hacking the shadow terminator"): from the flat
+    face light from the side would be lost between the vertices of a coarse mesh. `Points` that lie
+    a little inside the mesh see nothing: give an `offset`.
 
     Meshes may have any size and lie anywhere. What float32 rounds coordinates to is lost: give
     those of a map less their middle, or in float64.

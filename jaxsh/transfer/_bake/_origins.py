@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ...geometry import Mesh, Points, RayScene, Surface
+from ...geometry import Mesh, Points, RayScene, Surface, Texels
+from ._facets import raised
 
 # In half-extents of the mesh. Against `ray_bias=3e-7` the coefficients at degree 10 and 2,048
 # directions change by 0.02 to 0.15 % (RMS, seven scanned meshes); `ray_bias=1e-4` by 0.05 to 1.5 %.
@@ -44,7 +45,8 @@ def origins(
     """Take each point a little off the surface; those of a volume stay where they are.
 
     Vertices at a rim, also one where only the normals break, start as far inwards too, or they
-    would start within the plane of a surface that meets theirs there; and so do texels on it. A
+    would start within the plane of a surface that meets theirs there; and so do texels on it.
+    Texels start off the curved surface that normals tell of, rather than off their flat faces. A
     bias of points and texels is a share of the `mesh` in their way.
     """
     points, rim, size, inwards = _measured(surface, mesh)
@@ -61,6 +63,8 @@ def origins(
         wanted = offset if offset is not None else (ray_bias or 0) * half
         distance = np.maximum(wanted, least)
     _warn_of_large(distance, shortest, least, points)
+    if isinstance(surface, Texels):
+        points = raised(surface, normals, least, scene)
     every = np.arange(len(points))
 
     def lifted(by: Float[np.ndarray, " n"], at: slice | Int[np.ndarray, " n"]) -> np.ndarray:
