@@ -12,7 +12,7 @@ from jaxtyping import Array, ArrayLike, Float
 from .._core.checks import align, check_flag, check_type, is_concrete
 from .._core.linalg import einsum, matmul
 from .._core.xla import in_blocks, rows_at_once
-from ..geometry import RayScene
+from ..geometry import Mesh, RayScene
 from ..sphere import Suns
 from ._glossy_kernels import reflected, unit
 from ._material import Material, checked_albedo, checked_eye, checked_material
@@ -38,7 +38,7 @@ _TURNED = 1e-5
 def shade_sun(
     suns: Suns,
     surface: Surface,
-    scene: RayScene | SunVisibility | None = None,
+    scene: RayScene | Mesh | SunVisibility | None = None,
     albedo: Float[ArrayLike, "..."] | None = None,
     *,
     material: Material | None = None,
@@ -64,11 +64,10 @@ def shade_sun(
     **Arguments**
 
     - `suns`: S sources, each of less than a hemisphere; S may be 0.
-    - `surface`: a `Mesh`, a `Transfer`, or a sampled one. Of points alone make
-      `unshadowed(positions, normals, 0)`.
+    - `surface`: a `Mesh`, `Texels` or `Points` with normals, a `Transfer`, or a sampled one.
     - `scene`: what casts the shadows: the result of `sun_visibility`, cast once for these suns and
-      this surface; or a `geometry.RayScene`, with 16 rays to each source and vertex. By default the
-      mesh's own. A transfer has none.
+      this surface; or a `Mesh` or `geometry.RayScene`, with 16 rays to each source and vertex. By
+      default the mesh's own, or that of the texels. Points and a transfer have none.
     - `albedo`: of a diffuse surface, as for `shade_diffuse`; or in its place
     - `material` and `eye`, `distant`, `normalized`: as for `shade_glossy`.
     - `shadows`: `False` leaves out visibility, and all rays.
@@ -139,7 +138,7 @@ def _visibility(suns, surface, scene, shadows, count) -> SunVisibility | None:
         return None
     if not isinstance(scene, SunVisibility):
         if scene is not None:
-            check_type("scene", scene, RayScene, SunVisibility)
+            check_type("scene", scene, RayScene, Mesh, SunVisibility)
         return sun_visibility(suns, surface, scene)
     if scene.num_points != count:
         raise ValueError(

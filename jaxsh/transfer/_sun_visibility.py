@@ -22,17 +22,17 @@ from .._core.checks import (
 )
 from .._core.devices import Devices, mesh_of, share, whole
 from .._core.host import cores
-from ..geometry import Mesh, RayScene, ray_scene
+from ..geometry import Mesh, Points, RayScene, Texels, ray_scene
 from ..sphere import Suns
 from ._bake._directions import spread
-from ._bake._faults import check_rays
+from ._bake._faults import check_mesh, check_surface
 from ._bake._origins import origins
-from ._bake._receivers import unit_normals
+from ._bake._receivers import units_of
 from ._forms import SampledTransfer
 from ._glossy_kernels import unit
 from ._transfer import Transfer
 
-Surface = Mesh | Transfer | SampledTransfer
+Surface = Mesh | Points | Texels | Transfer | SampledTransfer
 
 RAYS = 16
 # Points whose rays one thread makes and casts at a time.
@@ -87,7 +87,7 @@ class SunVisibility(eqx.Module):
 def sun_visibility(
     suns: Suns,
     surface: Surface,
-    scene: RayScene | None = None,
+    scene: RayScene | Mesh | None = None,
     *,
     rays: int | None = None,
     ray_bias: float | None = None,
@@ -107,20 +107,22 @@ def sun_visibility(
     **Arguments**
 
     - `suns`: from `sphere.split_sun`, or written down.
-    - `surface`: a `Mesh`, or a `Transfer`, also a sampled one. Of points alone make one:
-      `unshadowed(positions, normals, 0)`. Only a mesh has edges and rims, by which rays start near
-      the surface as the bake's do; of points rays start along the normal alone.
-    - `scene`: the surfaces that stop rays, any `geometry.RayScene`. By default those of the mesh
-      itself, `geometry.ray_scene(mesh)`, which casts by JAX where Embree is not installed. Building
-      it takes as long as some rays: build it once where suns move.
+    - `surface`: a `Mesh`, `Texels` or `Points` with normals, or a `Transfer`, also a sampled one.
+      Only a mesh and its texels have edges and rims, by which rays start near the surface as the
+      bake's do; of points, and of a transfer's, rays start along the normal alone.
+    - `scene`: the surfaces that stop rays, a `Mesh` or any `geometry.RayScene`. By default those of
+      the mesh itself, or that of the texels, by `geometry.ray_scene(mesh)`, which casts by JAX
+      where Embree is not installed. Building it takes as long as some rays: build it once where
+      suns move.
     - `rays`: to each source, 16 by default, or all of a `shape` with fewer. For a `shape` of N
       vectors a number that divides N. Of 32 or more some 16 are cast first, and where these agree
       they speak for all: 64 take much less than four times as long.
     - `ray_bias`, `offset`: where rays start off the surface, as for `bake`.
     - `seed`: draws the angles. The same one gives the same bits, whatever the number of threads.
 
-    **Returns** a `SunVisibility`. Raises `ValueError` for arguments and values out of range, for a
-    transfer without a scene, and under `jit`: runs in NumPy on the host, before it.
+    **Returns** a `SunVisibility`. Raises `ValueError` for arguments and values out of range, for
+    points or a transfer without a scene, for points without normals, and under `jit`: runs in NumPy
+    on the host, before it.
 
     **Example**
 
@@ -136,21 +138,27 @@ def sun_visibility(
     seed = check_size("seed", seed, least=0)
     count = ray_count(suns, rays)
     if scene is not None:
-        check_type("scene", scene, RayScene)
-    elif not isinstance(surface, Mesh):
+        check_type("scene", scene, RayScene, Mesh)
+    elif not isinstance(surface, Mesh | Texels):
         raise ValueError(
-            "expected a scene for the points of a transfer, which has no faces that stop rays: "
-            "give geometry.ray_scene(mesh), or the mesh as the surface"
+            "expected a scene for points, or those of a transfer, which have no faces that stop "
+            "rays: give a mesh or geometry.ray_scene(mesh), or the mesh as the surface"
         )
     for name in ("direction", "solid_angle"):
         as_host_float(getattr(suns, name), f"{name} of the suns")
-    mesh = surface
-    if not isinstance(mesh, Mesh):
-        mesh = Mesh(positions, jnp.zeros((0, 3), jnp.int32), normals)
-    check_rays(mesh, ray_bias, offset)
-    scene = ray_scene(mesh) if scene is None else scene
-    upright = unit_normals(mesh)
-    start = origins(mesh, upright, scene, ray_bias, offset).positions
+    given, stopping = surface, scene
+    if isinstance(given, Transfer | SampledTransfer):
+        given = Mesh(positions, jnp.zeros((0, 3), jnp.int32), normals)
+    check_surface(given, ray_bias, offset)
+    if scene is None:
+        stopping = given.mesh if isinstance(given, Texels) else given
+    mesh = stopping if isinstance(stopping, Mesh) else None
+    if isinstance(scene, Mesh):
+        check_mesh("scene", scene)
+    caster = ray_scene(mesh) if mesh is not None else stopping
+    assert isinstance(caster, RayScene)
+    upright = units_of(given)
+    start = origins(given, upright, caster, ray_bias, offset, mesh=mesh).positions
     draw = _draws(np.asarray(positions), seed)
     towards, middle = (np.asarray(a, upright.dtype) for a in aimed(suns, count))
     # Of a shape, groups of neighbors. Double: within a small source products differ by little.
@@ -165,7 +173,7 @@ def sun_visibility(
             vectors = _rays(draw[part], towards[sun], middle[sun], suns, count)
             # Not as a matrix product, whose threads would stand in each other's way.
             a, b, c = (vectors[..., i] * upright[part, None, i] for i in range(3))
-            seen[part, sun] = _seen(scene, start[part], vectors, a + b + c > 0, guides[sun])
+            seen[part, sun] = _seen(caster, start[part], vectors, a + b + c > 0, guides[sun])
 
     # `with jax.enable_x64(True)` holds on its own thread alone.
     double = jnp.result_type(float) == jnp.float64
@@ -254,9 +262,13 @@ def aimed(suns: Suns, count: int) -> tuple[Float[Array, "s n 3"], Float[Array, "
 
 def points_of(surface: Surface) -> tuple[Float[Array, "v 3"], Float[Array, "v 3"]]:
     """Returns positions and normals of any surface."""
-    check_type("surface", surface, Mesh, Transfer, SampledTransfer)
+    check_type("surface", surface, Mesh, Points, Texels, Transfer, SampledTransfer)
     if isinstance(surface, Mesh):
         return as_float(surface.vertices, "vertices"), as_float(surface.normals, "normals")
+    if isinstance(surface, Points | Texels):
+        if surface.normals is None:
+            raise ValueError("expected points with normals, of a surface, got points without")
+        return surface.positions, surface.normals
     check_cosine(surface)
     if isinstance(surface, SampledTransfer):
         return surface.positions.T, surface.normals.T

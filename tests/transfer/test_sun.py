@@ -302,7 +302,7 @@ def test_mistakes_are_told(rng, unchecked):
     seen = sun_visibility(sun, floor, rays=4)
     material = Material(0.5, 0.5, 8.0)
     for call, said in (
-        (lambda: shade_sun(sun, made, albedo=0.5), "expected a scene for the points"),
+        (lambda: shade_sun(sun, made, albedo=0.5), "expected a scene for points, or"),
         (lambda: shade_sun(sun, made, seen, 0.5), "3 vertices, but visibility is of 4"),
         (lambda: shade_sun(two, floor, seen, 0.5), "2 suns, but visibility is of 1"),
         (lambda: shade_sun(suns(rng, 0.1), floor, seen, 0.5), "suns of another direction"),

@@ -1,12 +1,13 @@
 """Visibility of compact sources against the share of a disc that a wall leaves."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from bodies import by_hand, points, rectangle
 
-from jaxsh.geometry import JaxRayScene, knot, ray_scene
+from jaxsh.geometry import JaxRayScene, Points, Texels, knot, ray_scene
 from jaxsh.sphere import Suns
-from jaxsh.transfer import sun_visibility
+from jaxsh.transfer import shade_sun, sun_visibility
 
 RADIUS = 0.1
 
@@ -54,6 +55,32 @@ def test_a_wall_leaves_its_share_of_the_disc(rng, share, shaped):
     most, bias = (0.062, 0.02) if shaped else (0.047, 0.004)
     assert np.sqrt(np.mean((fraction - exact) ** 2)) < most
     np.testing.assert_allclose(fraction.mean(), exact, rtol=0, atol=bias)
+
+
+def test_points_and_texels_are_lit_as_vertices_are():
+    mesh = knot(300)
+    _, first = np.unique(np.asarray(mesh.faces), return_index=True)
+    points, numbers = Points(mesh.vertices, mesh.normals), jnp.arange(300, dtype=jnp.int32)
+    atlas = Texels(
+        points.positions,
+        points.normals,
+        jnp.zeros((300, 2), jnp.float32),
+        face=jnp.asarray(first // 3, jnp.int32),
+        barycentric=jnp.asarray(np.eye(3)[first % 3], jnp.float32),
+        source=numbers[None],
+        mesh=mesh,
+        vertex=numbers,
+    )
+    expected = sun_visibility(sun(0.8), mesh).seen
+    np.testing.assert_array_equal(sun_visibility(sun(0.8), atlas).seen, expected)
+    np.testing.assert_array_equal(sun_visibility(sun(0.8), points, mesh).seen, expected)
+    light = shade_sun(sun(0.8), mesh, albedo=0.5)
+    np.testing.assert_array_equal(shade_sun(sun(0.8), points, mesh, albedo=0.5), light)
+    np.testing.assert_array_equal(shade_sun(sun(0.8), atlas, albedo=0.5), light)
+    with pytest.raises(ValueError, match="expected a scene for points, or those of a transfer"):
+        sun_visibility(sun(0.8), points)
+    with pytest.raises(ValueError, match="expected points with normals, of a surface"):
+        sun_visibility(sun(0.8), Points(mesh.vertices), mesh)
 
 
 def test_one_position_has_one_pattern_and_a_seed_its_bits(rng):

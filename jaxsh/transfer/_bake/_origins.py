@@ -116,7 +116,8 @@ def _measured(surface: Surface, mesh: Mesh | None) -> _Measured:
     shortest, longest = _edges(vertices, faces)
     corners, weights = faces[np.asarray(surface.face)], np.asarray(surface.barycentric)
     off = weights < _BESIDE  # the corners across from which a texel lies
-    rim = off.any(axis=1) & (off | _open(faces, len(vertices))[corners]).all(axis=1)
+    on_rim = (off | _open(faces, len(vertices))[corners]).all(axis=1)
+    rim = np.logical_and(off.any(axis=1), on_rim)
 
     def inwards(some: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
         return _unit(vertices[corners[some]].mean(axis=1, dtype=np.float64) - points[some])
