@@ -113,8 +113,8 @@ class Masks(AbstractFilter):
     Called with a frame as `shade` is, it **returns** an `AdaptiveResult`. `active_fraction` counts
     who stays after each level, before refinement; the paper's filtering ratio is one less it.
     Differentiable in light, material and transfer, forward and reverse, where nobody enters or
-    leaves; thresholds and exposure have no gradient. Without rings and smoothing it keeps a
-    sharding over vertices.
+    leaves; thresholds and exposure have no gradient. It keeps a sharding over vertices; with rings
+    or smoothing devices tell each other who is inside, and colors, but not inside `shard_map`.
 
     Deviations: |change|, the largest over the channels, where the paper writes change; the second
     loop of algorithm 3 adds the increment alone. Raises `ValueError` for shapes and options that

@@ -149,7 +149,8 @@ def make_tiles(
       tiles of their own, `num_tiles` on each.
     - `eye`: a point, or with `distant` the direction to an eye far away.
     - `num_tiles`: more are more exact.
-    - `block`: the number of vertices that a tile's size is a multiple of.
+    - `block`: the number of vertices that a tile's size is a multiple of. Devices that share the
+      vertices share it too, down to 16, so that their tiles are as narrow as one device's.
     - `directions`: of each tile. More are more exact, and cost more per frame; as many as
       `transfer.sample` takes leave no error.
     - `exponent`: of the lobes to come. Others are less exact.

@@ -18,6 +18,8 @@ from ._sharing import made_of_rows, sharing
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 128
 NUM_TILES = 128
+# Vertices of a block at least, where devices share out the vertices and those of their blocks.
+_LEAST = 16
 
 
 class Tiling(eqx.Module):
@@ -79,6 +81,8 @@ def make_tiling(
     if areas.shape != (transfer.num_points,):
         raise ValueError(f"expected areas ({transfer.num_points},), got shape {areas.shape}")
     shared = sharing(transfer.coefficients)
+    if shared and shared.parts > 1:  # a device with a part of the vertices has as many blocks
+        block = max(-(-block // shared.parts), min(block, _LEAST))
     axis, units = _mirrored(eye, transfer.positions, transfer.normals, distant)
 
     def split(part, axis, units, areas):

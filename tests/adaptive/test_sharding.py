@@ -91,9 +91,17 @@ def test_rings_and_smoothing_reach_other_devices(frame, method):
     def color(light, made, eye, material):
         return adaptive.shade(light, made, eye, material, method).color
 
-    plain = adaptive.shade(*frame, dataclasses.replace(method, rings=0, smoothing=False)).color
-    assert np.any(np.abs(color(*frame) - plain) > 1e-3)
     check_sharded(color, frame, (WHOLE, ROWS, WHOLE, ROWS), ROWS, mapped=False, exchange=EXCHANGE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", NEAR, ids=lambda method: type(method).__name__)
+def test_they_change_what_is_tried_above(frame, method):
+    with_them, without = (
+        adaptive.shade(*frame, one).color
+        for one in (method, dataclasses.replace(method, rings=0, smoothing=False))
+    )
+    assert np.any(np.abs(with_them - without) > 1e-3)
 
 
 def test_neighbors_are_out_of_reach_inside_shard_map(frame):
@@ -108,9 +116,8 @@ def test_neighbors_are_out_of_reach_inside_shard_map(frame):
             jax.eval_shape(inside, placed)
 
 
-@pytest.mark.parametrize(
-    "kind", ["Explicit", pytest.param("Auto", marks=pytest.mark.slow)], ids=str.lower
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["Explicit", "Auto"], ids=str.lower)
 def test_stages_of_each_device_are_those_of_one(frame, kind):
     """Staged there, and shared out when that was done: the same arrays, and nothing exchanged."""
     light, made, eye, _ = frame
@@ -149,7 +156,7 @@ def make_tiles(made):
 @pytest.mark.parametrize(
     "kind", ["Explicit", pytest.param("Auto", marks=pytest.mark.slow)], ids=str.lower
 )
-@pytest.mark.parametrize("make", [make_anchors, make_tiles])
+@pytest.mark.parametrize("make", [make_tiles, pytest.param(make_anchors, marks=pytest.mark.slow)])
 def test_each_device_has_a_set_of_its_own_vertices(rng, make, kind):
     """As exact as on one device, without a word to the other, and as good on one device after."""
     ball, light = shadowed_ball(rng), rng.normal(size=(3, WIDTH))
@@ -175,8 +182,7 @@ def test_sets_that_are_shared_otherwise_are_refused(frame):
     light, made, eye, _ = frame
     material = Material(0.5, 0.5, 8.0)
     mesh = mesh_of("Auto")
-    anchors = jax.device_put(make_anchors(made), NamedSharding(mesh, P()))
-    anchors(light, eye, material)  # on each device in full
+    anchors = make_anchors(made)
     placed = eqx.tree_at(
         lambda one: one.rows.samples,
         anchors,

@@ -50,6 +50,7 @@ def calls():
         ),
         "Levels": of(a.Levels, **shared, diffuse_threshold=0.1),
         "Masks": of(a.Masks, **shared, diffuse_threshold=0.1),
+        "StagedTransfer.sharded": of(a.stage(made).sharded, devices=None, host=True),
         "TileFollower": of(
             a.TileFollower,
             atlas=atlas,
