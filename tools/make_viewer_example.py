@@ -1,4 +1,4 @@
-"""Make the page and the pictures of `docs/viewer.md`: a knot under several lights.
+"""Make the page and the pictures of `docs/viewer.md`: a knot under several lights, and a vase.
 
 python tools/make_viewer_example.py docs [--pictures]
 
@@ -9,6 +9,7 @@ installed; `CHROMIUM=path` names one.
 import os
 import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -59,6 +60,44 @@ def values_of(mesh: geometry.Mesh, baked: transfer.Transfer, light: ArrayLike) -
     }
 
 
+def make_textured(path: Path) -> Path:
+    """A vase with a painted texture, lit texel by texel: 256 × 256, the UV as it was turned."""
+    rows, columns = 49, 97
+    v, u = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
+    radius = 0.35 + 0.22 * np.sin(5.2 * v + 0.3) + 0.05 * v
+    angle = 2 * np.pi * u
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 1.7 * v], axis=2)
+    at = np.arange((rows - 1) * columns).reshape(rows - 1, columns)[:, :-1].ravel()
+    faces = np.concatenate(
+        [
+            np.stack([at, at + 1, at + columns + 1], 1),
+            np.stack([at, at + columns + 1, at + columns], 1),
+        ]
+    ).astype(np.int32)
+    y, x = np.mgrid[:512, :1024] / 512
+    bands = np.sin(40 * y + 4 * np.sin(8 * np.pi * x)) > 0.2
+    leaves = np.sin(16 * np.pi * x) * np.sin(12 * np.pi * y + 3) > 0.55
+    texture = np.full((512, 1024, 4), 255, np.uint8)
+    texture[..., :3] = np.where(bands[..., None], [214, 158, 92], [236, 226, 204])
+    texture[leaves, :3] = [46, 82, 104]
+    vertices = jnp.asarray(points.reshape(-1, 3), jnp.float32)
+    mesh = geometry.Mesh(
+        vertices,
+        jnp.asarray(faces),
+        geometry.vertex_normals(vertices, jnp.asarray(faces)),
+        jnp.asarray(np.stack([u, v], axis=2).reshape(-1, 2), jnp.float32),
+        None,
+        jnp.zeros(len(faces), jnp.int32),
+        (geometry.BaseColor("glaze", texture=texture, double_sided=True),),
+    )
+    texels = geometry.texels(mesh, 256)
+    baked = transfer.bake(texels, DEGREE, directions=512, bounces=1, albedo=0.6, progress=False)
+    studio = sphere.project_lat_long(imaging.studio(), DEGREE) * harmonics.window("hann", DEGREE)
+    gloss = transfer.Material(1.0, 0.05, 24.0)
+    title = "A vase, lit texel by texel"
+    return viewer.export_html(path, baked, studio, texels, gloss, textured=True, title=title)
+
+
 # Each picture: its name, its size, whether it is dark, and what the page is set to.
 PICTURES = (
     (
@@ -75,7 +114,10 @@ PICTURES = (
 )
 
 
-def make_pictures(page: Path, folder: Path) -> None:
+TEXTURED = (("viewer-texels", (960, 560), False, "viewer.set({})"),)
+
+
+def make_pictures(page: Path, folder: Path, pictures: tuple = PICTURES) -> None:
     from playwright.sync_api import sync_playwright
 
     chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
@@ -83,7 +125,7 @@ def make_pictures(page: Path, folder: Path) -> None:
     options = [*software, "--no-sandbox", "--disable-dev-shm-usage"]
     with sync_playwright() as started:
         browser = started.chromium.launch(executable_path=chromium, args=options)
-        for name, (width, height), dark, state in PICTURES:
+        for name, (width, height), dark, state in pictures:
             shown = browser.new_page(
                 viewport={"width": width, "height": height},
                 color_scheme="dark" if dark else "light",
@@ -104,3 +146,6 @@ if __name__ == "__main__":
     if "--pictures" not in sys.argv:
         make_page(docs / "examples" / "viewer.html")
     make_pictures(docs / "examples" / "viewer.html", docs / "images")
+    with tempfile.TemporaryDirectory() as folder:
+        vase = make_textured(Path(folder) / "vase.html")
+        make_pictures(vase, docs / "images", TEXTURED)

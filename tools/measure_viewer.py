@@ -1,6 +1,10 @@
 """Count how many changes of light a second the viewer draws: the figures of `docs/viewer.md`.
 
 python tools/measure_viewer.py [--vertices 50000] [--degree 10] [--chromium-options=...]
+python tools/measure_viewer.py --texels 256 [--degree 10]
+
+The second is of a square of 256 × 256 texels with a texture of 1024 × 1024, and a knot that stands
+in its light.
 
 Needs the package playwright and a Chromium that is installed; `CHROMIUM=path` names one. As it
 stands all is drawn in software (SwiftShader), so that every machine can say something; with
@@ -9,11 +13,13 @@ has other work, the CPU time of all of the browser's processes (Linux) says more
 """
 
 import argparse
+import dataclasses
 import os
 import shutil
 import tempfile
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxsh import geometry, transfer, viewer
@@ -77,17 +83,40 @@ def cpu_seconds() -> float:
     return sum(time for process, time in times.items() if ours(process))
 
 
-def main(vertices: int, degree: int, options: str, seconds: float) -> None:
+def square(side: int) -> geometry.Texels:
+    """Two faces with a texture of sums of sines, and the texels of a picture over them."""
+    corners = np.array([[-1.0, 1.2, -1], [1, 1.2, -1], [1, 1.2, 1], [-1, 1.2, 1]])
+    mesh = geometry.make_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+    x, y = np.meshgrid(np.arange(1024), np.arange(1024))
+    waves = np.stack([np.sin(x / 9 + y / 31), np.sin(x / 17), np.sin(x * y / 2e4), 1 + 0 * x], 2)
+    texture = np.rint(127.5 + 127.5 * waves).astype(np.uint8)
+    mesh = dataclasses.replace(
+        mesh,
+        uv=(mesh.vertices[:, ::2] + 1) / 2,
+        materials=(geometry.BaseColor(texture=texture),),
+        face_material=jnp.zeros(2, jnp.int32),
+    )
+    return geometry.texels(mesh, side)
+
+
+def main(vertices: int, texels: int, degree: int, options: str, seconds: float) -> None:
     from playwright.sync_api import sync_playwright
 
-    mesh = geometry.knot(vertices)
-    made = transfer.unshadowed(mesh.vertices, mesh.normals, degree)
+    if texels:
+        surface = square(texels)
+        before = geometry.ray_scene([surface.mesh, geometry.knot(2000)])
+        made = transfer.bake(surface, degree, directions=256, scene=before, progress=False)
+    else:
+        surface = geometry.knot(vertices)
+        made = transfer.unshadowed(surface.vertices, surface.normals, degree)
     light = np.random.default_rng(0).normal(size=(3, (degree + 1) ** 2)) * 0.1
     light[:, 0] = 2.0
     chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as started:
-        page = viewer.export_html(Path(folder) / "knot.html", made, light, mesh.faces)
-        print(f"{len(mesh.vertices)} vertices, degree {degree}: {page.stat().st_size / 1e6:.1f} MB")
+        page = viewer.export_html(Path(folder) / "knot.html", made, light, surface)
+        print(
+            f"{made.num_points} {made.surface}, degree {degree}: {page.stat().st_size / 1e6:.1f} MB"
+        )
         arguments = [*options.split(), "--no-sandbox", "--disable-dev-shm-usage"]
         browser = started.chromium.launch(executable_path=chromium, args=arguments)
         shown = browser.new_page(viewport={"width": 1072, "height": 600})
@@ -107,8 +136,9 @@ def main(vertices: int, degree: int, options: str, seconds: float) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Count changes of light a second.")
     parser.add_argument("--vertices", type=int, default=50_000)
+    parser.add_argument("--texels", type=int, default=0, help="along a side, instead of vertices")
     parser.add_argument("--degree", type=int, default=10)
     parser.add_argument("--chromium-options", default=SOFTWARE)
     parser.add_argument("--seconds", type=float, default=3.0)
     given = parser.parse_args()
-    main(given.vertices, given.degree, given.chromium_options, given.seconds)
+    main(given.vertices, given.texels, given.degree, given.chromium_options, given.seconds)

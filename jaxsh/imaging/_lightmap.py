@@ -13,6 +13,9 @@ from ..geometry import Texels
 from ._display import tone_map
 from ._write import write_image
 
+# A brightest texel that is scaled to 1 may come out a little above.
+_WHITE = 1 + 1e-5
+
 
 def write_lightmap(
     path: str | os.PathLike[str],
@@ -38,7 +41,8 @@ def write_lightmap(
 
     Runs on the host. Raises `ValueError` for other extensions and shapes, for NaN and infinite
     values, and for an exposure in an .exr; `OSError` where the file cannot be written. One
-    `UserWarning` counts the texels that a .png cuts off, above 1 or below 0.
+    `UserWarning` counts the texels that a .png cuts off at 1. Below 0, where a light rings, it is
+    black.
 
     **Example**
 
@@ -65,13 +69,11 @@ def write_lightmap(
         raise ValueError(f"{path}: an .exr keeps values as they are, got exposure={exposure:g}")
     light = _checked(values, texels)
     if suffix == ".png":
-        shown = exposure * np.asarray(light, np.float64)
-        cut = int(((shown > 1) | (shown < 0)).any(axis=1).sum())
-        if cut:
+        brightest = exposure * np.asarray(light, np.float64).max(axis=1)
+        if cut := int((brightest > _WHITE).sum()):
             warnings.warn(
-                f"{path}: {cut:,} of {len(shown):,} texels are cut off, between "
-                f"{shown.min():.3g} and {shown.max():.3g} for 0 to 1: give a lower exposure, or "
-                "write .exr",
+                f"{path}: {cut:,} of {len(light):,} texels are cut off at 1, the brightest of "
+                f"{brightest.max():.3g}: give a lower exposure, or write .exr",
                 stacklevel=2,
             )
         light = tone_map(light, exposure)

@@ -71,9 +71,7 @@ def tinted(
 ) -> Float[Array, "v 3"]:
     """Multiply what is diffuse of what points send out by the mean base color around."""
     assert surface.mesh is not None
-    own = base_color(surface.mesh).astype(sent.dtype)
-    if surface.texels is not None:
-        own = surface.texels.carry(own)
+    own = base_color(surface.mesh, surface.texels).astype(sent.dtype)
     return sent + diffuse * (own - 1)
 
 

@@ -53,7 +53,9 @@ def test_a_png_is_what_a_screen_shows_and_says_what_it_cuts(tmp_path, texels, rn
     codes = np.rint(255 * np.asarray(imaging.tone_map(jnp.asarray(light), 0.5)))
     np.testing.assert_array_equal(np.asarray(Image.open(path)), shown(texels, codes))
     light[3, 1], light[5] = 2.5, -0.1
-    with pytest.warns(UserWarning, match=r"2 of \d+ texels are cut off, between -0.05 and 1.25"):
+    with pytest.warns(
+        UserWarning, match=r"1 of \d+ texels are cut off at 1, the brightest of 1.25"
+    ):
         imaging.write_lightmap(path, texels, light, exposure=0.5)
 
 
