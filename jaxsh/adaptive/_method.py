@@ -117,9 +117,14 @@ def plain_transfer(name: str, transfer: AbstractTransfer) -> Transfer:
     return plain
 
 
-def check_neighbors(name: str, *trees) -> None:
-    """Raises `ValueError` inside `shard_map`, where neighbors are out of reach."""
-    if inside_shard_map(*trees):
+def check_neighbors(name: str, transfer: Transfer) -> None:
+    """Raises `ValueError` where there are no neighbors, or out of reach inside `shard_map`."""
+    if transfer.surface != "vertices" and transfer.neighbors.shape[1] <= 1:
+        raise ValueError(
+            f"{name} with rings or smoothing looks at neighbors, which {transfer.surface} do not "
+            "have: give rings=0 and smoothing=False, or a Transfer with a table of neighbors"
+        )
+    if inside_shard_map(transfer):
         raise ValueError(
             f"{name} with rings or smoothing looks at neighbors, which other devices may have: "
             "call it outside shard_map"

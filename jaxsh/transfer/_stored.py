@@ -125,8 +125,10 @@ def open(path: str | os.PathLike[str]) -> StoredTransfer:
 
     It is a Zarr 3 group of the arrays `coefficients` (V, K), `positions`, `normals` and `neighbors`
     of a `Transfer`, and `faces`, `unit_normals`, `origins` of rays and `albedo`, which bakes go on
-    from. Each is in chunks of the same number of rows, little-endian with a CRC-32C. Attributes
-    say the format, its version, the degree, the bake's arguments, the mesh's fingerprint and all
+    from; beside points that are not its vertices a mesh's `vertices`, `faces`, `normals` and
+    `origins` in a group `occluder`. Each is in chunks of the same number of rows, those of the
+    group of another, little-endian with a CRC-32C. Attributes say the format, its version (2 for
+    points and texels, with what they are), the degree, the bake's arguments, fingerprints and all
     checksums, by which a chunk that took another's place is told.
 
     Raises `FileNotFoundError` where nothing is there, and `ValueError`, naming the path and the

@@ -75,6 +75,15 @@ def test_shading_a_volume_as_a_surface_is_refused(unchecked, shade):
         shade(VOLUME)
 
 
+@pytest.mark.parametrize(
+    "method", [adaptive.Levels(rings=1), adaptive.TwoStage(smoothing=True, base=1)]
+)
+def test_methods_that_look_at_neighbors_refuse_points(method):
+    points = dataclasses.replace(MADE, surface="points")
+    with pytest.raises(ValueError, match="looks at neighbors, which points do not have"):
+        adaptive.shade(LIGHT, points, EYE, GLOSSY, method)
+
+
 def test_fluence_is_the_product_of_coefficients(rng):
     lights = jnp.asarray(rng.normal(size=(2, 300, 3, 9)), jnp.float32)
     got = transfer.fluence(lights, VOLUME)
