@@ -14,6 +14,8 @@ _ON_EDGE = 1e-6
 _INSIDE = 0.01
 # Twice the area of the smallest face that has one.
 _AREA = 1e-9
+# Shorter sums of unit normals have no direction: the face's own stands in.
+_SHORT = 1e-6
 # Pairs of a face and a texel that are looked at together.
 _BLOCK = 1 << 20
 
@@ -38,16 +40,14 @@ def cover(corners: Float[np.ndarray, "f 3 2"], width: int, height: int) -> Cover
     area = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
     solid = np.flatnonzero(area > _AREA)  # false for NaN, too
     face = np.full(height * width, -1, np.int32)
-    deep = np.zeros(height * width, np.uint8)
+    deep = np.zeros(height * width, np.int32)  # faces that a center is deep in
     of_span, row, first, count = _spans(corners[solid], width, height)
     for part in _blocks(count):
         span = np.repeat(part, count[part])
         column, line, own = ranges(first[part], count[part]), row[span], solid[of_span[span]]
         texel = line * width + column
         inside = _depth(corners[own], area[own], column + 0.5, line + 0.5) > _INSIDE
-        # Two counts are as good as many.
-        deep += np.minimum(np.bincount(texel[inside], minlength=len(deep)), 2).astype(np.uint8)
-        np.minimum(deep, 2, out=deep)
+        np.add.at(deep, texel[inside], 1)
         # Faces ascend along the pairs: reversed, the first is written last.
         free = face[texel] < 0
         face[texel[free][::-1]] = own[free][::-1]
@@ -92,6 +92,32 @@ def barycentric(
     third = (one[:, 0] * to[:, 1] - one[:, 1] * to[:, 0]) / twice
     weights = np.maximum(np.stack([1 - second - third, second, third], axis=1), 0)
     return weights / weights.sum(axis=1, keepdims=True)
+
+
+def places(
+    vertices: Float[np.ndarray, "v 3"],
+    normals: Float[np.ndarray, "v 3"],
+    faces: Int[np.ndarray, "f 3"],
+    face: Int[np.ndarray, " n"],
+    weights: Float[np.ndarray, "n 3"],
+    *,
+    smooth: bool,
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+    """Give positions and unit normals in faces, with weights of their corners."""
+    at = faces[face]
+    corners, around = vertices[at].astype(np.float64), normals[at].astype(np.float64)
+    positions = np.einsum("nkc,nk->nc", corners, weights)
+    mean = np.einsum("nkc,nk->nc", around, weights)
+    if smooth:
+        # What the point lies below the plane through each corner across its normal, which on a
+        # sphere is twice what it lies below the sphere.
+        below = np.einsum("nkc,nkc->nk", positions[:, None] - corners, around)
+        positions -= np.einsum("nkc,nk->nc", around, np.minimum(below, 0) * weights) / 2
+    length = np.linalg.norm(mean, axis=1, keepdims=True)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    mean = np.where(length > _SHORT, mean, across)
+    length = np.linalg.norm(mean, axis=1, keepdims=True)
+    return positions, mean / np.maximum(length, np.finfo(np.float64).tiny)
 
 
 def nearest(
@@ -162,14 +188,12 @@ def _spans(corners: Float[np.ndarray, "f 3 2"], width: int, height: int) -> tupl
     return face, row, first, np.maximum(end - first, 0)
 
 
-def _blocks(counts: np.ndarray):
+def _blocks(counts: np.ndarray) -> list[np.ndarray]:
     """Give stretches of indices whose counts add up to about a block."""
     ends = np.cumsum(counts)
     total = int(ends[-1]) if len(ends) else 0
     cuts = np.searchsorted(ends, np.arange(_BLOCK, total, _BLOCK), side="right")
-    for part in np.split(np.arange(len(counts)), np.unique(cuts)):
-        if len(part):
-            yield part
+    return [part for part in np.split(np.arange(len(counts)), np.unique(cuts)) if len(part)]
 
 
 def _depth(corners: np.ndarray, area: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -21,13 +21,13 @@ from .._core.checks import (
 )
 from .._core.linalg import einsum
 from .._core.xla import keep_rows, rows_are_split
-from ._atlas import Covered, barycentric, cover, nearest
+from ._atlas import Covered, barycentric, cover, nearest, places
 from ._mesh import Mesh
 from ._points import Points
 from ._unwrap import unwrap as unwrapped
 
-# Shorter sums of unit normals have no direction: the face's own stands in.
-_SHORT = 1e-6
+# Texels whose places are computed together.
+_BLOCK = 1 << 20
 # Largest picture: its texels are numbered in int32.
 _MOST = 2**15
 
@@ -184,9 +184,14 @@ def texels(
 
     **Example**
 
+    >>> import dataclasses
+    >>> import numpy as np
     >>> from jaxsh import geometry
-    >>> mesh = geometry.knot(300)
-    >>> tube = geometry.texels(mesh, 64)  # doctest: +SKIP
+    >>> triangle = geometry.make_mesh(np.eye(3), np.array([[0, 1, 2]]))
+    >>> triangle = dataclasses.replace(triangle, uv=triangle.vertices[:, :2])
+    >>> held = geometry.texels(triangle, 4, gutter=1)
+    >>> held.source.tolist()
+    [[0, 0, 2, -1], [1, 2, 2, 5], [3, 4, 5, 5], [6, 7, 8, 9]]
     """
     check_type("mesh", mesh, Mesh)
     width, height = _size(resolution)
@@ -222,37 +227,33 @@ def _texels(
     smooth: bool,
 ) -> Texels:
     height, width = covered.face.shape
-    row, column = np.nonzero(covered.face >= 0)
-    face = covered.face[row, column]
-    center = np.stack([column, row], axis=1) + 0.5
-    small = np.isin(face, covered.small)
-    center[small] = corners[face[small]].mean(axis=1)
-    weights = barycentric(corners[face], center)
-    at = np.asarray(mesh.faces)[face]
-    places = np.asarray(mesh.vertices, np.float64)[at]
-    positions = np.einsum("nkc,nk->nc", places, weights)
-    around = np.asarray(mesh.normals, np.float64)[at]
-    if smooth:
-        # What the point lies below the plane through each corner across its normal, which on a
-        # sphere is twice what it lies below the sphere.
-        below = np.einsum("nkc,nkc->nk", positions[:, None] - places, around)
-        positions -= np.einsum("nkc,nk->nc", around, np.minimum(below, 0) * weights) / 2
-    normals = np.einsum("nkc,nk->nc", around, weights)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    across = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
-    normals = np.where(length > _SHORT, normals, across)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    source = np.full((height, width), -1, np.int32)
-    source[row, column] = np.arange(len(face))
-    uv = np.stack([center[:, 0] / width, 1 - center[:, 1] / height], axis=1)
-    like = mesh.vertices.dtype
+    face = covered.face.ravel()
+    texel = np.flatnonzero(face >= 0)
+    face = face[texel]
+    source = np.full(height * width, -1, np.int32)
+    source[texel] = np.arange(len(texel), dtype=np.int32)
+    small = np.zeros(len(corners), bool)
+    small[covered.small] = True
+    widths = {"positions": 3, "normals": 3, "uv": 2, "barycentric": 3}
+    like = np.dtype(mesh.vertices.dtype)
+    rows = {name: np.empty((len(texel), n), like) for name, n in widths.items()}
+    vertices, normals, faces = map(np.asarray, (mesh.vertices, mesh.normals, mesh.faces))
+    for start in range(0, len(texel), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        row, column = np.divmod(texel[part], width)
+        center = np.stack([column, row], axis=1) + 0.5
+        alone = small[face[part]]
+        center[alone] = corners[face[part][alone]].mean(axis=1)
+        weights = barycentric(corners[face[part]], center)
+        rows["positions"][part], rows["normals"][part] = places(
+            vertices, normals, faces, face[part], weights, smooth=smooth
+        )
+        rows["uv"][part] = np.stack([center[:, 0] / width, 1 - center[:, 1] / height], axis=1)
+        rows["barycentric"][part] = weights
     return Texels(
-        positions=jnp.asarray(positions, like),
-        normals=jnp.asarray(normals, like),
-        uv=jnp.asarray(uv, like),
-        face=jnp.asarray(face, jnp.int32),
-        barycentric=jnp.asarray(weights, like),
-        source=jnp.asarray(nearest(source, corners, gutter), jnp.int32),
+        **{name: jnp.asarray(array) for name, array in rows.items()},
+        face=jnp.asarray(face),
+        source=jnp.asarray(nearest(source.reshape(height, width), corners, gutter)),
         mesh=mesh,
         vertex=jnp.asarray(vertex),
     )

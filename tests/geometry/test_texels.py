@@ -13,8 +13,10 @@ from jaxsh.geometry import _atlas
 
 
 def with_uv(vertices, faces, uv):
-    mesh = geometry.make_mesh(vertices, faces)
-    return dataclasses.replace(mesh, uv=jnp.asarray(uv, mesh.vertices.dtype))
+    """A mesh in z = 0; of arrays as they are, since `make_mesh` compiles for each shape."""
+    vertices, uv = np.asarray(vertices, np.float32), np.asarray(uv, np.float32)
+    up = np.broadcast_to(np.array([0, 0, 1], np.float32), vertices.shape)
+    return geometry.Mesh(*map(jnp.asarray, (vertices, faces, up, uv)))
 
 
 def centers(width, height):

@@ -59,7 +59,7 @@ def test_its_charts_do_not_overlap(knot, held):
     assert covered.flat == covered.hidden == 0
 
 
-@pytest.mark.parametrize("resolution", [128, (160, 96)])
+@pytest.mark.parametrize("resolution", [128, pytest.param((160, 96), marks=pytest.mark.slow)])
 def test_a_gutter_of_one_serves_bilinear_look_ups(knot, held, resolution, rng):
     """Looked up anywhere on the surface, a picture of positions gives about the place itself."""
     held = held if resolution == 128 else geometry.texels(knot, resolution, gutter=1)
@@ -83,13 +83,15 @@ def surface(mesh) -> float:
     return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
 
 
+@pytest.mark.slow
 def test_the_same_mesh_is_unwrapped_alike(knot, held):
     again = geometry.texels(knot, 128, gutter=1)
     for one, other in zip(jax.tree.leaves(held), jax.tree.leaves(again), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
-def test_size_and_place_of_a_mesh_do_not_matter(knot, held):
+@pytest.mark.slow
+def test_the_size_of_a_mesh_does_not_matter(knot, held):
     small = dataclasses.replace(knot, vertices=1e-6 * knot.vertices)
     assert abs(geometry.texels(small, 128, gutter=1).num_points / held.num_points - 1) < 0.1
 
