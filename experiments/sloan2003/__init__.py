@@ -1,0 +1,1 @@
+"""Transfer compressed by clusters with principal components, after Sloan et al. 2003."""
