@@ -100,19 +100,12 @@ def places(
     faces: Int[np.ndarray, "f 3"],
     face: Int[np.ndarray, " n"],
     weights: Float[np.ndarray, "n 3"],
-    *,
-    smooth: bool,
 ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
     """Give positions and unit normals in faces, with weights of their corners."""
     at = faces[face]
     corners, around = vertices[at].astype(np.float64), normals[at].astype(np.float64)
     positions = np.einsum("nkc,nk->nc", corners, weights)
     mean = np.einsum("nkc,nk->nc", around, weights)
-    if smooth:
-        # What the point lies below the plane through each corner across its normal, which on a
-        # sphere is twice what it lies below the sphere.
-        below = np.einsum("nkc,nkc->nk", positions[:, None] - corners, around)
-        positions -= np.einsum("nkc,nk->nc", around, np.minimum(below, 0) * weights) / 2
     length = np.linalg.norm(mean, axis=1, keepdims=True)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     mean = np.where(length > _SHORT, mean, across)
@@ -131,7 +124,7 @@ def nearest(
         return own
     from scipy import ndimage  # JAX itself needs SciPy
 
-    away = ndimage.distance_transform_cdt(~_touched(own >= 0, corners), metric="chessboard")
+    away: Any = ndimage.distance_transform_cdt(~_touched(own >= 0, corners), metric="chessboard")
     found: Any = ndimage.distance_transform_edt(
         own < 0, return_distances=False, return_indices=True
     )

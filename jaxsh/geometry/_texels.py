@@ -150,7 +150,6 @@ def texels(
     *,
     gutter: int = 2,
     unwrap: bool = False,
-    smooth: bool = False,
 ) -> Texels:
     """Find the places on a mesh that the texels of a picture show at their centers, by its UV.
 
@@ -168,15 +167,11 @@ def texels(
       many for each level of mip maps.
     - `unwrap`: True unwraps also a mesh that has UV: for those that overlap or repeat, as for
       textures. These textures stay with the mesh given, and are left out of `Texels.mesh`.
-    - `smooth`: True lifts positions off the flat faces, outwards, onto the surface that the normals
-      of the vertices suggest (by half of what Hanika 2021 does, "Hacking the shadow terminator",
-      Ray Tracing Gems II, ch. 4: on a sphere that is where it is). For coarse meshes: a face stops
-      light from below its plane that the normal still looks at, and so shows as a facet.
 
     **Returns** `Texels`; what is there in floats has the dtype of the mesh's vertices.
 
     Runs on the host, outside `jit`; same result whenever it is run. Not differentiable itself:
-    `texels.carry(vertices)` are positions, not lifted ones, that differentiate.
+    `texels.carry(vertices)` are positions that differentiate.
 
     Raises `ValueError` for UV that overlap, that leave the picture by more than half a texel, or
     have no area at all, and `ImportError` where xatlas is needed and missing. One `UserWarning`
@@ -196,7 +191,7 @@ def texels(
     check_type("mesh", mesh, Mesh)
     width, height = _size(resolution)
     gutter = check_size("gutter", gutter, least=0)
-    unwrap, smooth = check_flag("unwrap", unwrap), check_flag("smooth", smooth)
+    unwrap = check_flag("unwrap", unwrap)
     check_known("mesh", mesh)
     faces = np.asarray(mesh.faces)
     if not len(faces):
@@ -215,7 +210,7 @@ def texels(
     corners = np.stack([corners[..., 0] * width, (1 - corners[..., 1]) * height], axis=-1)
     covered = cover(corners, width, height)
     _check(covered, own)
-    return _texels(mesh, corners, covered, gutter, vertex, smooth)
+    return _texels(mesh, corners, covered, gutter, vertex)
 
 
 def _texels(
@@ -224,7 +219,6 @@ def _texels(
     covered: Covered,
     gutter: int,
     vertex: np.ndarray,
-    smooth: bool,
 ) -> Texels:
     height, width = covered.face.shape
     face = covered.face.ravel()
@@ -246,7 +240,7 @@ def _texels(
         center[alone] = corners[face[part][alone]].mean(axis=1)
         weights = barycentric(corners[face[part]], center)
         rows["positions"][part], rows["normals"][part] = places(
-            vertices, normals, faces, face[part], weights, smooth=smooth
+            vertices, normals, faces, face[part], weights
         )
         rows["uv"][part] = np.stack([center[:, 0] / width, 1 - center[:, 1] / height], axis=1)
         rows["barycentric"][part] = weights

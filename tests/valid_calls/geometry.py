@@ -66,9 +66,7 @@ def calls():
             free="path origin",
             slow=True,
         ),
-        "texels": of(
-            g.texels, mesh=held.mesh, resolution=4, gutter=1, unwrap=False, smooth=False, host=True
-        ),
+        "texels": of(g.texels, mesh=held.mesh, resolution=4, gutter=1, unwrap=False, host=True),
         "topology": of(g.topology, mesh=mesh, host=True),
         "trace": of(
             g.trace, tree=scene.tree, **rays, max_distance=3.0, first=True, count=None, lanes=8
