@@ -23,7 +23,7 @@ def mitsuba() -> Any:
         mi = importlib.import_module("mitsuba")
     except ImportError:
         raise UserError(
-            "this experiment renders with Mitsuba: pip install mitsuba (the extra hosek has it)"
+            "this experiment renders with Mitsuba: pip install mitsuba, or the extra mitsuba"
         ) from None
     mi.set_variant("scalar_rgb")
     mi.set_log_level(mi.LogLevel.Warn)

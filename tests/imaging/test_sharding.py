@@ -82,6 +82,7 @@ def test_look_up_keeps_the_sharding_of_directions(rng):
     check_sharded(gradient, (directions, environment), (ROWS, WHOLE), ROWS)
 
 
+@pytest.mark.slow
 def test_textures_keep_the_sharding_of_coordinates(rng):
     texture = rng.uniform(size=(4, 6, 3)).astype(np.float32)
     uv = rng.uniform(-1, 2, size=(8, 2)).astype(np.float32)
