@@ -74,9 +74,9 @@ def make_scene(
     count = transfer.num_points
     if count > _ROW * _MOST_ROWS:
         raise ValueError(f"expected at most {_ROW * _MOST_ROWS} points of transfer, got {count}")
-    surface, albedo = make_surface(faces, transfer, albedo, textured)
+    surface, reflects = make_surface(faces, transfer, albedo, textured)
     corners = surface.faces
-    diffuse, material = split_material(albedo)
+    diffuse, material = split_material(reflects)
     shared, codes = _packed_albedo(diffuse, count)
     value_facts, value_codes = packed_values(values, count)
     if exposure is not None:
@@ -93,7 +93,7 @@ def make_scene(
     if exposure is None:
         # What the whole mesh sends out stands for what a picture shows of it.
         first = lights.kinds[0], lights.coefficients[0]
-        sent = shaded(*first, transfer, albedo, camera.position, lamp)
+        sent = shaded(*first, transfer, reflects, camera.position, lamp)
         if surface.tinted:
             sent = tinted(surface, sent, shaded(*first, transfer, diffuse, camera.position, lamp))
         exposure = float(auto_exposure(sent[None]))
@@ -133,7 +133,7 @@ def make_scene(
     if codes is not None:
         arrays["albedoCodes"] = codes.astype("<u2")
     named, joined = packed(header, arrays | surface.arrays | value_codes)
-    return Scene(named, joined, surface, albedo)
+    return Scene(named, joined, surface, reflects)
 
 
 def packed(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> tuple[dict[str, Any], bytes]:

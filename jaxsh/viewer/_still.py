@@ -30,9 +30,8 @@ class Still:
         self.transfer, self.albedo, self.height, self.lamp = transfer, albedo, height, lamp
         faces = jnp.asarray(surface.faces)
         self.surface = surface
-        self.mesh = surface.mesh
-        if self.mesh is None:
-            self.mesh = Mesh(transfer.positions, faces, transfer.normals)
+        mesh = surface.mesh
+        self.mesh = Mesh(transfer.positions, faces, transfer.normals) if mesh is None else mesh
 
     def png(self, light: Float[np.ndarray, "3 k"], header: dict[str, Any]) -> bytes:
         """A PNG with the ground transparent, four samples in a pixel."""

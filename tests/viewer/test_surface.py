@@ -15,6 +15,11 @@ from jaxsh import geometry, imaging, transfer, viewer
 LIGHT = pages.example(300, 2)[2]
 
 
+@pytest.fixture(scope="module")
+def texels() -> geometry.Texels:
+    return geometry.texels(pages.textured(6, 12), (24, 12))
+
+
 def made_of(surface) -> transfer.Transfer:
     if isinstance(surface, geometry.Texels):
         made = transfer.unshadowed(surface.positions, surface.normals, 2)
@@ -35,7 +40,7 @@ def arrays_of(page) -> tuple[dict, dict[str, np.ndarray]]:
 
 def test_the_base_color_is_sent_whole(tmp_path):
     mesh = pages.textured(6, 12)
-    page = viewer.export_html(tmp_path / "t.html", made_of(mesh), LIGHT, mesh)
+    page = viewer.export_html(tmp_path / "t.html", made_of(mesh), LIGHT, mesh, exposure=1.0)
     header, arrays = arrays_of(page)
     surface = header["surface"]
     assert [surface[name] for name in ("tinted", "colored", "texels")] == [True, True, None]
@@ -58,31 +63,36 @@ def test_the_base_color_is_sent_whole(tmp_path):
     np.testing.assert_array_equal(arrays["uv"].reshape(-1, 2), np.asarray(mesh.uv))
     colors = arrays["colorCodes"].reshape(-1, 3) / 65535 * scale
     np.testing.assert_allclose(colors, np.asarray(mesh.colors)[:, :3], rtol=0, atol=1e-5)
-    # As bright as its vertices are with their base color.
-    sent = transfer.shade_diffuse(LIGHT, made_of(mesh), imaging.base_color(mesh))
-    exposure = float(imaging.auto_exposure(sent[None]))
-    assert header["exposure"] == pytest.approx(exposure, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_the_exposure_is_that_of_points_with_their_base_color(tmp_path, texels):
+    mesh = pages.textured(6, 12)
+    for surface, base in (
+        (mesh, imaging.base_color(mesh)),
+        (texels, imaging.base_color(mesh, texels)),
+    ):
+        made = made_of(surface)
+        page = viewer.export_html(tmp_path / "t.html", made, LIGHT, surface)
+        sent = transfer.shade_diffuse(LIGHT, made, base)
+        exposure = float(imaging.auto_exposure(sent[None]))
+        assert arrays_of(page)[0]["exposure"] == pytest.approx(exposure, rel=1e-5)
 
 
 def test_an_albedo_takes_the_place_of_the_base_color(tmp_path):
     mesh = pages.textured(6, 12)
-    page = viewer.export_html(tmp_path / "t.html", made_of(mesh), LIGHT, mesh, 0.5)
+    page = viewer.export_html(tmp_path / "t.html", made_of(mesh), LIGHT, mesh, 0.5, exposure=1.0)
     header, arrays = arrays_of(page)
     assert not header["surface"]["tinted"]
     assert header["albedo"] == [0.5] * 3
     assert not {"uv", "colorCodes", "texture0"} & set(arrays)
     plain = dataclasses.replace(mesh, colors=None, materials=(), face_material=None)
-    page = viewer.export_html(tmp_path / "p.html", made_of(plain), LIGHT, plain)
+    page = viewer.export_html(tmp_path / "p.html", made_of(plain), LIGHT, plain, exposure=1.0)
     assert arrays_of(page)[0]["albedo"] == [0.8] * 3
 
 
-@pytest.fixture(scope="module")
-def texels() -> geometry.Texels:
-    return geometry.texels(pages.textured(6, 12), (24, 12))
-
-
 def test_texels_are_sent_with_the_mesh_that_they_lie_on(tmp_path, texels):
-    page = viewer.export_html(tmp_path / "t.html", made_of(texels), LIGHT, texels)
+    page = viewer.export_html(tmp_path / "t.html", made_of(texels), LIGHT, texels, exposure=1.0)
     header, arrays = arrays_of(page)
     assert header["numVertices"] == texels.num_points
     assert header["surface"]["texels"] == {"width": 24, "height": 12}
