@@ -5,6 +5,7 @@ import functools
 import hashlib
 import math
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -85,7 +86,6 @@ class _Scene(NamedTuple):
     """What all pictures share."""
 
     mesh: geometry.Mesh
-    baked: transfer.Transfer
     rays: geometry.RayScene
     cameras: list[imaging.Camera]
     lights: list[Light]
@@ -108,7 +108,7 @@ def dataset(config: Dataset, context: Context) -> Table:
             chosen += lights.of_day(config.suns, config.degree, **day)
     writing.claim(folder, _about(config, mesh, environments, chosen, context.seed))
     with context.time("bake"):
-        baked = _bake(config, mesh, folder, context.seed)
+        baked, bounced = _bake(config, mesh, folder, context.seed)
     cameras = views.around(
         mesh,
         config.views,
@@ -118,7 +118,7 @@ def dataset(config: Dataset, context: Context) -> Table:
         height=config.size,
         margin=0.05,
     )
-    scene = _scene(mesh, baked, cameras, chosen)
+    scene = _scene(mesh, baked, bounced, cameras, chosen)
     exposures = _exposures(scene, context)
     _tell(folder, scene, exposures)
     start, cpu = time.perf_counter(), time.process_time()
@@ -171,25 +171,33 @@ def _digest(tree: Any) -> str:
     return digest.hexdigest()[:16]
 
 
-def _bake(config: Dataset, mesh: geometry.Mesh, folder: Path, seed: int) -> transfer.Transfer:
+def _bake(
+    config: Dataset, mesh: geometry.Mesh, folder: Path, seed: int
+) -> tuple[transfer.Transfer, transfer.Transfer | None]:
+    """The transfer, and its part that bounces where suns need that by itself."""
+    bake = functools.partial(
+        transfer.bake, mesh, config.degree, directions=config.directions, seed=seed
+    )
     try:
-        baked = transfer.bake(
-            mesh,
-            config.degree,
-            directions=config.directions,
-            bounces=config.bounces,
-            albedo=np.asarray(imaging.base_color(mesh).mean(axis=1)),
-            seed=seed,
-            store=folder / "transfer",
-        )
+        if not config.bounces:
+            return jax.block_until_ready(bake(store=folder / "transfer")), None
+        albedo = np.asarray(imaging.base_color(mesh).mean(axis=1))
+        baked = bake(bounces=config.bounces, albedo=albedo, store=folder / "transfer")
+        if not config.suns:
+            return jax.block_until_ready(baked), None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # vertices that see nothing, told already
+            direct = bake(store=folder / "transfer_direct")
     except ValueError as error:
         raise UserError(" ".join(str(error).split())) from error
-    return jax.block_until_ready(baked)
+    bounced = dataclasses.replace(baked, coefficients=baked.coefficients - direct.coefficients)
+    return jax.block_until_ready((baked, bounced))
 
 
 def _scene(
     mesh: geometry.Mesh,
     baked: transfer.Transfer,
+    bounced: transfer.Transfer | None,
     cameras: list[imaging.Camera],
     chosen: list[Light],
 ) -> _Scene:
@@ -197,9 +205,9 @@ def _scene(
 
     @functools.lru_cache(maxsize=kept)
     def radiance(number: int) -> Float[Array, "v 3"]:
-        return chosen[number].radiance(mesh, baked, rays)
+        return chosen[number].radiance(mesh, baked, bounced, rays)
 
-    return _Scene(mesh, baked, rays, cameras, chosen, radiance, kept)
+    return _Scene(mesh, rays, cameras, chosen, radiance, kept)
 
 
 def _exposures(scene: _Scene, context: Context) -> list[float]:

@@ -39,13 +39,24 @@ class Light:
         return found | {"sun": sun}
 
     def radiance(
-        self, mesh: geometry.Mesh, baked: transfer.Transfer, scene: geometry.RayScene
+        self,
+        mesh: geometry.Mesh,
+        baked: transfer.Transfer,
+        bounced: transfer.Transfer | None,
+        scene: geometry.RayScene,
     ) -> Float[Array, "v 3"]:
-        """What leaves a white surface at each vertex; cut off below zero."""
+        """What leaves a white surface at each vertex; cut off below zero.
+
+        `bounced` is the part of `baked` that bounces: the sun's light reaches the surface directly
+        along rays, with shadows that have an edge, and otherwise by harmonics.
+        """
         shaded = transfer.shade_diffuse(self.coefficients, baked, 1.0)
         if self.sun is not None:
             seen = transfer.sun_visibility(self.sun, mesh, scene, rays=_RAYS)
             shaded = shaded + transfer.shade_sun(self.sun, mesh, seen, 1.0)
+            if bounced is not None:
+                light = self.sun.harmonics(baked.degree)
+                shaded = shaded + transfer.shade_diffuse(light, bounced, 1.0)
         return jnp.maximum(shaded, 0)
 
 

@@ -11,16 +11,18 @@ from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
+import OpenImageIO as oiio
 import pytest
+from PIL import Image
 from runs import run
 
-from experiments.dataset import pifu_bake, sources, views, writing
+from experiments.dataset import dataset, pifu_bake, sources, views, writing
 from experiments.runner import UserError
 from jaxsh import geometry, harmonics, imaging, transfer
 
 _SMALL = [
     *("--views", "2", "--turns", "1", "--suns", "1", "--size", "24", "--samples", "1"),
-    *("--degree", "2", "--directions", "16", "--bounces", "0", "--mesh", "knot"),
+    *("--degree", "2", "--directions", "16", "--bounces", "1", "--mesh", "knot"),
 ]
 
 
@@ -33,8 +35,8 @@ def test_cameras_as_matrices():
     seen = (np.c_[points, np.ones(len(points))] @ extrinsics.T) @ intrinsics.T
     rows, columns = np.divmod(np.arange(24), 6)
     wanted = np.stack([columns + 0.5, rows + 0.5], axis=1)
-    # 5e-7 measured, of float32's rays.
-    np.testing.assert_allclose(seen[:, :2] / seen[:, 2:], wanted, rtol=0, atol=2e-6)
+    # 2e-15 measured.
+    np.testing.assert_allclose(seen[:, :2] / seen[:, 2:], wanted, rtol=0, atol=1e-14)
 
 
 def test_cameras_around():
@@ -116,16 +118,27 @@ def test_pictures_follow_from_what_the_files_say(tmp_path):
     wanted[seen] = 255 * np.clip(signal, 0, 1)
 
     def stored(name: str) -> np.ndarray:
-        from PIL import Image
-
         return np.asarray(Image.open(folder / name)).reshape(576, -1)
+
+    def exact(path: Path) -> np.ndarray:
+        source = oiio.ImageInput.open(str(path))
+        return source.read_image("float").reshape(576, -1)
 
     np.testing.assert_allclose(stored("images/0001/0000.png"), wanted, rtol=0, atol=0.51)
     np.testing.assert_array_equal(stored("views/0001/mask.png")[:, 0], 255 * seen)
+    depth, normal = (exact(folder / f"views/0001/{name}.exr") for name in ("depth", "normal"))
+    np.testing.assert_array_equal(depth[~seen], 0)
+    along = hit.distance[seen] / np.linalg.norm(towards[seen], axis=1)
+    # 3e-7 measured.
+    np.testing.assert_allclose(depth[seen, 0], along, rtol=6e-7, atol=0)
+    smooth = (np.asarray(mesh.normals)[corners] * weights).sum(axis=1)
+    smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
+    np.testing.assert_allclose(normal[seen], smooth, rtol=0, atol=3e-4)  # of 16 bits
 
 
 @pytest.mark.slow
-def test_a_run_that_was_killed_goes_on(tmp_path):
+def test_a_run_that_was_killed_goes_on(tmp_path, monkeypatch):
+    """Bit by bit as one that was not, and with less memory."""
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     run(tmp_path, "dataset", *_SMALL, "--folder", str(whole))
     command = [sys.executable, "-m", "experiments", "run", "dataset", *_SMALL, "--no-progress"]
@@ -141,6 +154,7 @@ def test_a_run_that_was_killed_goes_on(tmp_path):
             process.send_signal(signal.SIGKILL)
     before = set(cut.glob("images/*/*.png"))
     assert before
+    monkeypatch.setattr(dataset, "_HELD", 1)  # one light at a time
     _, rows = run(tmp_path, "dataset", *_SMALL, "--folder", str(cut))
     assert rows[0]["made"] == 4 - len(before)
     assert _digests(cut) == _digests(whole)
