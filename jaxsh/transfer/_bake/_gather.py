@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
+from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
 from ..._core.linalg import matmul
@@ -15,6 +16,8 @@ from ._receivers import Faces, Receivers, unshadowed
 # Rows of every product: with one fixed shape a vertex's sums are added in one fixed order,
 # whatever the block it comes in.
 TILE = 64
+# Tiles in a call, each multiplied by itself: a call takes longer than the product of a small one.
+_TOGETHER = 4
 
 
 def shadowed(
@@ -141,14 +144,21 @@ def _in_tiles(
     By XLA, whose threads yield the cores while idle; OpenBLAS's spin, and take them from the rays.
     """
     result = np.empty((len(left), right.shape[1]), left.dtype)
-    for start in range(0, len(left), TILE):
-        tile = left[start : start + TILE]
-        whole = np.zeros((TILE, left.shape[1]), left.dtype)
-        whole[: len(tile)] = tile
-        result[start : start + TILE] = _product(whole, right)[: len(tile)]
+    start = 0
+    while start < len(left):
+        # One tile or several, never another number: two programs serve all blocks.
+        rows = TILE if len(left) - start <= TILE else _TOGETHER * TILE
+        part = left[start : start + rows]
+        whole = part
+        if len(part) < rows:
+            whole = np.zeros((rows, left.shape[1]), left.dtype)
+            whole[: len(part)] = part
+        products = np.asarray(_products(whole.reshape(-1, TILE, left.shape[1]), right))
+        result[start : start + rows] = products.reshape(rows, -1)[: len(part)]
+        start += rows
     return result
 
 
 @jax.jit
-def _product(left: Array, right: Array) -> Array:
-    return matmul(left, right)
+def _products(tiles: Array, right: Array) -> Array:
+    return lax.map(lambda tile: matmul(tile, right), tiles)
