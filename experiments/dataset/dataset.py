@@ -78,6 +78,12 @@ class Dataset:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         if min(self.suns, self.bounces, self.degree) < 0:
             raise ValueError("suns, bounces and degree must not be negative")
+        if not 2.5 <= self.turbidity <= 6:
+            raise ValueError(f"turbidity must be between 2.5 and 6, got {self.turbidity}")
+        if not 0 <= self.ground <= 1:
+            raise ValueError(f"ground must be between 0 and 1, got {self.ground}")
+        if not 0 < self.fov_y < 180:
+            raise ValueError(f"fov_y must be between 0 and 180 degrees, got {self.fov_y}")
         if not self.elevations or max(map(abs, self.elevations)) > 89:
             raise ValueError(f"elevations must be between -89 and 89, got {self.elevations}")
 

@@ -89,11 +89,11 @@ def of_day(
         noon = datetime.datetime.fromisoformat(day).replace(hour=12, tzinfo=datetime.UTC)
     except ValueError:
         raise UserError(f"day: expected a date such as 2026-06-21, got {day!r}") from None
-    minutes = 60 * np.arange(-1440, 1441) / 2  # half minutes about noon, local time of the sun
-    times = noon.timestamp() - longitude / 15 * 3600 + minutes
+    # Every half minute about noon of the sun.
+    times = noon.timestamp() - longitude / 15 * 3600 + 30.0 * np.arange(-1440, 1441)
     try:
         heights = np.asarray(sky.sun_direction(times, latitude, longitude))[:, 2]
-    except ImportError as error:
+    except (ImportError, ValueError) as error:
         raise UserError(f"suns of a day: {error}") from None
     up = times[heights > 0.05]
     if not len(up):

@@ -54,16 +54,23 @@ def claim(folder: Path, about: dict[str, Any]) -> None:
         found = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise UserError(f"{path}: no JSON ({error})") from error
-    wanted = json.loads(json.dumps(about))
-    if found != wanted:
-        keys = sorted({*found, *wanted}) if isinstance(found, dict) else []
-        other = [key for key in keys if found.get(key) != wanted.get(key)]
+    found, wanted = _flat(found), _flat(json.loads(json.dumps(about)))
+    other = [key for key in wanted if found.get(key) != wanted[key]]
+    if other or len(found) != len(wanted):
         raise UserError(
             f"{str(folder)!r} holds a dataset of other settings ({', '.join(other)}): choose "
             "--folder, or move it"
         )
     for part in folder.rglob("*.part*"):  # of a run that was killed
         part.unlink(missing_ok=True)
+
+
+def _flat(about: Any) -> dict[str, Any]:
+    """What is said, with the settings one by one."""
+    if not isinstance(about, dict):
+        return {}
+    settings = about.get("settings")
+    return about | (settings if isinstance(settings, dict) else {}) | {"settings": None}
 
 
 class Writer:
