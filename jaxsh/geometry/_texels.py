@@ -156,8 +156,8 @@ def texels(
     Light per texel is as fine as the picture, however coarse the mesh. A face too small for any
     center gets the texel that its middle lies in, where that is free. A mesh without UV is
     unwrapped by xatlas (the extra `xatlas`): cut into charts that are laid flat and packed with two
-    gutters between them. That takes most of the time, and the longer the larger the charts are: of
-    20,000 vertices about 15 s.
+    gutters between them. That takes most of the time, and more than in proportion to the vertices:
+    keep `Texels.mesh`, which has UV then.
 
     **Arguments**
 
