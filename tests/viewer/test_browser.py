@@ -29,6 +29,16 @@ AS_TEXT = """(values) => {
   return btoa(text);
 }"""
 
+LOSE_AND_RESTORE = """async () => {
+  const lose = viewer.renderer.gl.getExtension("WEBGL_lose_context");
+  const back = new Promise((done) =>
+    viewer.canvas.addEventListener("webglcontextrestored", () => setTimeout(done, 50)));
+  lose.loseContext();
+  await new Promise((done) => setTimeout(done, 50));
+  lose.restoreContext();
+  await back;
+}"""
+
 
 def opened(browser, file, faults: list[str]):
     """A page in a new window, when it has drawn; what goes wrong is written into `faults`."""
@@ -170,15 +180,7 @@ def test_the_ball_mirrors_the_light_and_turns_it(page):
 
 def test_a_lost_context_comes_back(page):
     before = colors(page)
-    page.evaluate("""async () => {
-      const lose = viewer.renderer.gl.getExtension("WEBGL_lose_context");
-      const back = new Promise((done) =>
-        viewer.canvas.addEventListener("webglcontextrestored", () => setTimeout(done, 50)));
-      lose.loseContext();
-      await new Promise((done) => setTimeout(done, 50));
-      lose.restoreContext();
-      await back;
-    }""")
+    page.evaluate(LOSE_AND_RESTORE)
     np.testing.assert_array_equal(colors(page), before)
 
 

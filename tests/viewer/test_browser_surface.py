@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 import viewer_pages as pages
 from scipy.ndimage import binary_erosion
-from test_browser import CHROMIUM, colors, levels, opened, read
+from test_browser import CHROMIUM, LOSE_AND_RESTORE, colors, levels, opened, read
 
-from jaxsh import geometry, imaging, transfer, viewer
+from jaxsh import geometry, imaging, midrange, transfer, viewer
+from jaxsh.viewer._lamp import lamp_radiance
 
 pytestmark = [
     pytest.mark.slow,
@@ -22,6 +23,9 @@ pytestmark = [
 ]
 WIDTH, HEIGHT, EXPOSURE, DEGREE = 192, 144, 3.0, 3
 LIGHT = pages.example(300, DEGREE)[2]
+LAMP = viewer.Lamp(
+    midrange.Sphere(jnp.array([0.8, -2.0, 1.2]), jnp.array(0.2), jnp.array([60.0, 50.0, 40.0]))
+)
 MATERIAL = transfer.Material(0.9, 0.3, 8.0)
 
 
@@ -77,6 +81,7 @@ def case(request, browser, tmp_path_factory):
         textured=True,
         camera=camera,
         exposure=EXPOSURE,
+        lamp=LAMP,
         values={"fifth": np.arange(made.num_points) % 5},
     )
     faults = []
@@ -99,10 +104,23 @@ def test_pixels_have_texture_and_gloss(case):
     page.evaluate("viewer.reset()")
 
 
+def test_a_lamp_near_the_mesh_has_the_texture_too(case):
+    white = lamp_radiance(LAMP, case.made, DEGREE, 0.9)
+    case.page.evaluate("viewer.set({ index: 1 })")
+    case.check(imaging.base_color(case.mesh, case.raster) * case.carried(white))
+    case.page.evaluate("viewer.reset()")
+
+
+def test_a_lost_context_comes_back_with_its_pictures(case):
+    before = case.picture()
+    case.page.evaluate(LOSE_AND_RESTORE)
+    np.testing.assert_array_equal(case.picture(), before)
+
+
 def test_two_sides_have_light_of_their_own(case):
     page = case.page
     page.evaluate("viewer.set({ gloss: 0 }); viewer.set({ compare: true }); viewer.choose(1)")
-    page.evaluate("viewer.set({ intensity: 0.5, degree: 3 })")
+    page.evaluate("viewer.set({ index: 0, gloss: 0, intensity: 0.5, degree: 3 })")
     signal = jnp.asarray(case.picture(2 * WIDTH)[..., :3] / np.float32(255))
     page.evaluate("viewer.reset()")
     left, right = np.split(np.asarray(imaging.srgb_decode(signal)), 2, axis=1)
