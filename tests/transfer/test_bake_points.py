@@ -113,9 +113,9 @@ def test_points_of_a_volume_see_half_of_space_and_around_a_disc():
     plane = bodies.rectangle([-1e4, -1e4, 0], [2e4, 0, 0], [0, 2e4, 0])
     above = Points(jnp.asarray([[0, 0, 1], [3, 2, 0.1]], jnp.float32))
     options = {"directions": 1024}
-    half = baked(above, 4, scene=plane, **options)
-    exact = whole_sphere(0.0, 4)
-    np.testing.assert_allclose(half.coefficients, [exact] * 2, rtol=0, atol=9e-3)  # 8.3e-3 measured
+    half = baked(above, 2, scene=plane, **options)
+    exact = whole_sphere(0.0, 2)
+    np.testing.assert_allclose(half.coefficients, [exact] * 2, rtol=0, atol=8e-3)  # 6.8e-3 measured
     angle = np.linspace(0, 2 * np.pi, 97)[:-1]
     rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     each = np.arange(96)
@@ -125,17 +125,17 @@ def test_points_of_a_volume_see_half_of_space_and_around_a_disc():
         [[0, 0, 1]] * 97,
     )
     over = baked(
-        Points(jnp.asarray([[0, 0, 1.0], [0, 0, 9e3]], jnp.float32)), 4, scene=disc, **options
+        Points(jnp.asarray([[0, 0, 1.0], [0, 0, 9e3]], jnp.float32)), 2, scene=disc, **options
     )
     # The cone of half angle 45° about -z; from far away nothing is in the way.
-    cone = whole_sphere(-1.0, 4) - whole_sphere(np.sqrt(0.5), 4) * np.sign(exact_parity(4))
-    np.testing.assert_allclose(over.coefficients[0], cone, rtol=0, atol=1e-2)  # 9.4e-3 measured
+    cone = whole_sphere(-1.0, 2) - whole_sphere(np.sqrt(0.5), 2) * np.sign(exact_parity(2))
+    np.testing.assert_allclose(over.coefficients[0], cone, rtol=0, atol=5e-3)  # 4.3e-3 measured
     np.testing.assert_array_equal(over.coefficients[1, 1:], 0)
-    free = baked(above, 4, shadows=False)
+    free = baked(above, 2, shadows=False)
     np.testing.assert_allclose(free.coefficients[:, 0], np.sqrt(4 * np.pi), rtol=1e-7)
     np.testing.assert_array_equal(free.coefficients[:, 1:], 0)
     assert (free.surface, free.cosine) == ("points", False)
-    sky = jnp.zeros((3, 25), jnp.float32).at[:, 0].set((4 * np.pi) ** 0.5)  # radiance 1
+    sky = jnp.zeros((3, 9), jnp.float32).at[:, 0].set((4 * np.pi) ** 0.5)  # radiance 1
     np.testing.assert_allclose(fluence(sky, half), 2 * np.pi, rtol=4e-3)  # 3.5e-3 measured
 
 
@@ -193,18 +193,18 @@ def test_texels_of_a_floor_under_a_wall():
     floor = dataclasses.replace(floor, uv=uv)
     wall = bodies.rectangle([0, -1e4, -1e4], [0, 2e4, 0], [0, 0, 2e4])
     atlas = texels(floor, 4)
-    got = baked(atlas, 4, scene=ray_scene([floor, wall]), directions=1024)
-    exact = bodies.lune(0, np.pi / 2, 4)
-    np.testing.assert_allclose(got.coefficients, [exact] * 16, rtol=0, atol=6e-3)  # 4.9e-3 measured
+    got = baked(atlas, 2, scene=ray_scene([floor, wall]), directions=1024)
+    exact = bodies.lune(0, np.pi / 2, 2)
+    np.testing.assert_allclose(got.coefficients, [exact] * 16, rtol=0, atol=5e-3)  # 3.8e-3 measured
     light = jnp.zeros((3, 1), jnp.float32).at[:, 0].set((4 * np.pi) ** 0.5)
     picture = atlas.image(shade_diffuse(light, got, 1.0))
     np.testing.assert_allclose(picture, 0.5, rtol=0, atol=4e-3)  # 3.1e-3 measured
     on_rim = texels_at_vertices(floor)
     np.testing.assert_allclose(
-        baked(on_rim, 4, scene=ray_scene([floor, wall]), directions=1024).coefficients,
+        baked(on_rim, 2, scene=ray_scene([floor, wall]), directions=1024).coefficients,
         [exact] * 4,
         rtol=0,
-        atol=6e-3,
+        atol=5e-3,
     )
 
 
@@ -262,7 +262,7 @@ def test_a_store_goes_on_and_keeps_what_its_points_are(tmp_path, monkeypatch, su
 def test_stores_that_do_not_say_what_they_are_of_hold_vertices(tmp_path):
     """As those were written that knew of nothing else: read, and gone on from."""
     path = tmp_path / "knot"
-    expected = baked(MESH, store=path, bounces=1).coefficients
+    expected = baked(MESH, store=path).coefficients
     file = path / "zarr.json"
     about = json.loads(file.read_text())
     assert about["attributes"]["version"] == 1
@@ -270,7 +270,7 @@ def test_stores_that_do_not_say_what_they_are_of_hold_vertices(tmp_path):
         del about["attributes"]["arguments"][name]
     file.write_text(json.dumps(about))
     (path / "coefficients" / "c" / "3" / "0").unlink()
-    np.testing.assert_array_equal(baked(MESH, store=path, bounces=1).coefficients, expected)
+    np.testing.assert_array_equal(baked(MESH, store=path).coefficients, expected)
     assert (open(path).surface, open(path).cosine) == ("vertices", True)
     about["attributes"]["surface"] = "sea"
     file.write_text(json.dumps(about))
@@ -278,6 +278,7 @@ def test_stores_that_do_not_say_what_they_are_of_hold_vertices(tmp_path):
         open(path)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings(SEEING)
 def test_the_bits_are_those_of_the_points_alone():
     options = {"scene": MESH, "bounces": 1}

@@ -28,16 +28,14 @@ def test_each_form_says_what_its_points_are():
         texels.truncated(1),
         texels.astype(np.float16),
         texels.sharded(one),
-        transfer.sample(texels),
-        transfer.sample(texels).sharded(one),
-        transfer.quantize(texels),
+        transfer.sample(texels, 1).sharded(one),
         transfer.quantize(texels).sharded(one),
         jax.tree.map(lambda array: array, texels),
     ):
         assert kind(form) == ("texels", True), type(form)
     assert kind(transfer.quantize(VOLUME)) == ("points", False)
-    assert kind(transfer.sample(VOLUME)) == ("points", False)
-    assert kind(adaptive.stage(dataclasses.replace(MADE, surface="points"))) == ("points", True)
+    staged = adaptive.stage(dataclasses.replace(MADE, surface="points"), 1, middle=1, base=1)
+    assert kind(staged) == ("points", True)
 
 
 def test_other_kinds_are_refused(unchecked):
