@@ -32,7 +32,11 @@ def unwrap(mesh: Mesh, width: int, height: int, gutter: int) -> tuple[Mesh, Int[
     numbers and their corners. Textures are left out, since they belong to other UV.
     """
     charts = _cut(mesh)
-    uv, apart = _pack(charts, min(width, height), gutter)
+    # A gutter along the picture's rim too: look-ups that repeat it reach across.
+    size = min(width, height)
+    rim = min(gutter, (size - 1) // 4)
+    inner, apart = _pack(charts, size - 2 * rim, gutter)
+    uv = (inner * (size - 2 * rim) + rim) / size
     if apart < min(2 * gutter, 2):
         warnings.warn(
             f"texels: {width} × {height} leave less than 2 between the {charts.number:,} charts "
