@@ -189,7 +189,7 @@ def _mesh(config: Rough, context: Context, nearest: dict[tuple[Any, ...], Phong]
                 row[f"{key}_psnr"] = exposed.psnr(made, true)[0]
             row["ratio"] = row["ggx"] / row["phong"]
             context.record(row)
-            if roughness in config.roughness[::2]:
+            if roughness in config.roughness[:3:2]:  # few enough to look at
                 title = f"roughness {roughness:g}, F₀ {specular:g}"
                 shown.append(
                     [
@@ -215,7 +215,7 @@ class Scene(NamedTuple):
     eye: Float[Array, " 3"]
     seen: Int[np.ndarray, " s"]  # vertices that face the eye
     light: Float[Array, "3 k"]
-    count: int  # of halfway vectors by height, and by azimuth
+    halfway: int  # vectors by height, and by azimuth
 
 
 def _by_rays(scene: Scene, roughness: float, specular: float) -> Float[Array, "v 3"]:
@@ -235,7 +235,7 @@ def _by_rays(scene: Scene, roughness: float, specular: float) -> Float[Array, "v
         seen = jnp.einsum("vnk,ck->vnc", basis, light, precision="highest")
         return jnp.einsum("vn,vnc->vc", weights, seen, precision="highest")
 
-    counts = scene.count, scene.count
+    counts = scene.halfway, scene.halfway
     for some in np.array_split(scene.seen, -(-len(scene.seen) // _BLOCK)):
         directions, weights = incoming(eyes[some], normals[some], roughness, specular, counts)
         vertex, ray = np.nonzero(weights)

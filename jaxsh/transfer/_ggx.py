@@ -1,6 +1,7 @@
 """GGX reflection as a zonal lobe: the best one for each degree, roughness and angle of view."""
 
 import functools
+import math
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,12 +11,14 @@ from numpy.polynomial.legendre import leggauss, legvander
 
 from .._core.host import read_only_cache
 from .._core.linalg import matmul, tensordot
+from .._core.xla import in_blocks, materialize, rows_at_once
 from ..harmonics import clamped_cosine, legendre, orders
 from ._nodes import product_nodes
 
 # Chebyshev polynomials in roughness and in the cosine of the angle of view, and their places.
 _TERMS = 14, 18
 _PLACES = 18, 24
+_BLOCK = 1024  # vertices whose terms stay in cache
 _HALFWAYS = 32, 48  # halfway vectors by height and azimuth
 # Keeps the fit from adding what no surface of it sees.
 _STIFFNESS = 1e-6
@@ -37,25 +40,40 @@ def ggx_lobe(
     both it and the roughness are from 0 to 1.
     """
     table, bands, dtype = ggx_table(degree), degree + 1, cosine.dtype
-    across = _chebyshev(cosine, _TERMS[1])
-    along = _chebyshev(jnp.asarray(roughness, dtype), _TERMS[0])
     if roughness.ndim == 0:
-        values = matmul(tensordot(along, jnp.asarray(table, dtype)), across)
+        along = _chebyshev(roughness.astype(dtype), _TERMS[0])
+        values = matmul(tensordot(along, jnp.asarray(table, dtype)), _across(cosine)).T
     else:
-        # Term by term, so that no array of both kinds of terms is held for each vertex.
-        products = (
-            term[None] * matmul(jnp.asarray(some, dtype), across)
-            for some, term in zip(table, along, strict=True)
-        )
-        values = functools.reduce(jnp.add, products)
-    white, black = values[:bands].T, values[bands : 2 * bands].T
-    whole, grazing = values[-2][:, None], values[-1][:, None]
+        evaluate = functools.partial(_by_vertex, table=table)
+        most = rows_at_once(math.prod(table.shape[:2]) * dtype.itemsize)
+        values = in_blocks(evaluate, cosine, roughness.astype(dtype), size=_BLOCK, most=most)
+    white, black = values[:, :bands], values[:, bands : 2 * bands]
+    whole, grazing = values[:, -2:-1], values[:, -1:]
     normal = jnp.asarray(specular, dtype).reshape(-1, *specular.shape[-1:] or (1,))
     mean = jnp.mean(normal, axis=1, keepdims=True)
     lobe = mean * white + (1 - mean) * grazing * black
     # What the transfer leaves of it: the table alone would be off by some percent.
-    taken = matmul(lobe * _legendre(cosine, degree), clamped_cosine(degree).astype(dtype))
+    taken = matmul(
+        lobe * materialize(functools.partial(_legendre, degree=degree), cosine),
+        clamped_cosine(degree).astype(dtype),
+    )
     return lobe / taken[:, None], whole * (normal + (1 - normal) * grazing)
+
+
+def _across(cosine: Float[Array, " v"]) -> Float[Array, "terms v"]:
+    # Once, where XLA would take each term anew from those before it.
+    return materialize(functools.partial(_chebyshev, count=_TERMS[1]), cosine)
+
+
+def _by_vertex(
+    cosine: Float[Array, " v"],
+    roughness: Float[Array, " v"],
+    table: Float[np.ndarray, "i rows j"],
+) -> Float[Array, "v rows"]:
+    along = materialize(functools.partial(_chebyshev, count=_TERMS[0]), roughness)
+    flat = jnp.asarray(table.reshape(-1, table.shape[2]), cosine.dtype)
+    products = matmul(flat, _across(cosine)).reshape(*table.shape[:2], -1)
+    return jnp.sum(products * along[:, None], axis=0).T
 
 
 def _chebyshev(x: Float[Array, "..."], count: int) -> Float[Array, "terms ..."]:

@@ -15,6 +15,7 @@ from jaxsh.transfer import (
     shade_sun,
     unshadowed,
 )
+from jaxsh.transfer._ggx import ggx_lobe
 
 DEGREE, EYE = 3, np.array([0.3, -4.0, 1.5])
 
@@ -35,36 +36,33 @@ def brdf(incoming, eye, roughness, specular):
     return density * fresnel / (1 + sum(hidden)) / (4 * incoming[:, 2] * eye[2])
 
 
-def reflected(cosines, roughness, specular, degree, size=100):
-    """Coefficients (v, K) of BRDF times cosine, with which light turns into radiance."""
+def reflected(cosine, roughness, specular, size=100):
+    """Coefficients (K,) of BRDF times cosine for n = z, and the eye at this cosine in y = 0.
+
+    In the frame of `by_lobe`, where the eye is z.
+    """
     z, weights = np.polynomial.legendre.leggauss(size)
     z, weights = (z + 1) / 2, weights / 2
     phi = (np.arange(2 * size) + 0.5) * np.pi / size
     r = np.sqrt(1 - z**2)[:, None]
     grid = np.stack([r * np.cos(phi), r * np.sin(phi), z[:, None] + 0 * phi], -1).reshape(-1, 3)
     weights = np.repeat(weights * np.pi / size * z, len(phi))
-    basis = np.asarray(harmonics.evaluate(grid, degree))
-    eyes = np.stack([np.sqrt(1 - cosines**2), 0 * cosines, cosines], axis=1)
-    return np.stack([(brdf(grid, eye, roughness, specular) * weights) @ basis for eye in eyes])
+    sine = np.sqrt(1 - cosine**2)
+    # The eye (sine, 0, cosine) comes to z, the normal z to (sine, 0, cosine).
+    x, y, z = np.array([[-cosine, 0, sine], [0, -1, 0], [sine, 0, cosine]]) @ grid.T
+    m, azimuth = harmonics.orders(DEGREE)[:, None], np.arctan2(y, x)
+    basis = harmonics.legendre(np.clip(z, -1, 1), DEGREE)
+    basis *= np.where(m < 0, np.sin(-m * azimuth), np.cos(m * azimuth))
+    return basis @ (brdf(grid, np.array([sine, 0, cosine]), roughness, specular) * weights)
 
 
-def by_lobe(cosines, material, degree):
+def by_lobe(cosines, material):
     """Coefficients of what `fixed_view` reflects of an open surface that is seen at an angle."""
     # As one program for all angles: surfaces that are turned below one eye.
     normals = np.stack([np.sqrt(1 - cosines**2), 0 * cosines, cosines], axis=1)
-    made = unshadowed(0 * normals, jnp.asarray(normals), degree)
+    made = unshadowed(0 * normals, jnp.asarray(normals), DEGREE)
     up = np.array([0, 0, 1.0])
-    return fixed_view(made, up, material, distant=True).coefficients
-
-
-def turned(coefficients, cosines, degree):
-    """Turns each from n = z and the eye aside to the frame of `by_lobe`."""
-    out = []
-    for one, c in zip(coefficients, cosines, strict=True):
-        s = np.sqrt(1 - c**2)
-        # The eye (s, 0, c) comes to z, the normal z to (s, 0, c).
-        out.append(harmonics.rotate(one, np.array([[-c, 0, s], [0, -1, 0], [s, 0, c]])))
-    return np.stack(out)
+    return np.asarray(fixed_view(made, up, material, distant=True).coefficients)
 
 
 # By reflectance along the normal and roughness, at cosines of 0.3, 0.7 and 1: measured, and 0.01.
@@ -82,23 +80,37 @@ def test_the_lobe_is_near_the_true_brdf():
     cosines = np.array([0.3, 0.7, 1.0])
     specular, roughness = np.repeat(np.array(list(ERRORS)), 3, axis=0).T
     material = Material.ggx(0.0, specular[:, None], roughness)
-    got = np.asarray(by_lobe(np.tile(cosines, 6), material, DEGREE)).reshape(6, 3, -1)
+    got = by_lobe(np.tile(cosines, 6), material).reshape(6, 3, -1)
     for (color, rough), lobe in zip(ERRORS, got, strict=True):
-        exact = turned(reflected(cosines, rough, color, DEGREE), cosines, DEGREE)
+        exact = np.stack([reflected(cosine, rough, color) for cosine in cosines])
         # Of uniform light, what GGX reflects: measured to 0.26 %.
         np.testing.assert_allclose(lobe[:, 0], exact[:, 0], rtol=0.003, atol=0)
         errors = np.linalg.norm(lobe - exact, axis=1) / np.linalg.norm(exact, axis=1)
         assert (errors < np.array(ERRORS[color, rough])).all(), (color, rough, errors)
 
 
-def test_every_method_shades_it(rng):
-    """Where each is the same integral, to rounding; colors and roughness by vertex."""
-    made, light, material = frame(rng)
-    expected = np.asarray(shade_glossy(light, made, EYE, material))
+def test_fixed_views_and_lights_are_the_same_to_rounding(rng):
+    """As what is shaded in full; specular albedo and roughness by vertex."""
+    made, light, _ = frame(rng)
+    material = Material.ggx(0.0, rng.uniform(size=(18, 1)), rng.uniform(0.1, 1, size=18))
+    expected = np.asarray(shade_glossy(light, made, EYE, material, distant=True))
     for got in (
-        shade_glossy(light, sample(made), EYE, material),
-        fixed_light(light, made)(EYE, material),
-        fixed_view(made, EYE, material)(light),
+        fixed_light(light, made)(EYE, material, distant=True),
+        fixed_view(made, EYE, material, distant=True)(light),
+    ):
+        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.slow
+def test_samples_and_one_roughness_for_all(rng):
+    made, light, material = frame(rng)
+    one = Material.ggx(0.1, material.specular, 0.4)
+    many = Material.ggx(0.1, material.specular, np.full(18, 0.4))
+    expected = np.asarray(shade_glossy(light, made, EYE, one))
+    for got in (
+        shade_glossy(light, made, EYE, many),
+        shade_glossy(light, sample(made), EYE, one),
+        shade_glossy(light, sample(made), EYE, many),
     ):
         np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
@@ -122,7 +134,7 @@ def test_the_adaptive_ones_too(rng):
     np.testing.assert_allclose(got, shade_glossy(light, made, EYE, one), rtol=0, atol=1e-11)
 
 
-def frame(rng, count=7):
+def frame(rng, count=18):
     """An open surface, a light and a material by vertex."""
     normals = rng.normal(size=(count, 3)) + np.array([[0, -2, 0]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -131,14 +143,33 @@ def frame(rng, count=7):
     return made, rng.normal(size=(3, (DEGREE + 1) ** 2)), Material.ggx(0.1, colors, roughness)
 
 
-def test_its_derivatives(rng):
+def test_derivatives_of_the_lobe(rng):
+    """In roughness, reflectance and angle, against differences."""
+    arguments = tuple(jnp.asarray(rng.uniform(0.1, 0.9, size=18)) for _ in range(3))
+    along = tuple(jnp.asarray(rng.normal(size=18)) for _ in range(3))
+
+    @jax.jit
+    def lobe(roughness, specular, cosine):
+        return jnp.concatenate(ggx_lobe(roughness, specular[:, None], cosine, DEGREE), axis=1)
+
+    forward = jax.jvp(lobe, arguments, along)[1]
+    step = 1e-6
+    ends = [
+        lobe(*(a + t * d for a, d in zip(arguments, along, strict=True))) for t in (-step, step)
+    ]
+    difference = (ends[1] - ends[0]) / (2 * step)
+    np.testing.assert_allclose(forward, difference, rtol=0, atol=1e-8 * np.abs(forward).max())
+
+
+@pytest.mark.slow
+def test_derivatives_of_what_is_seen(rng):
     made, light, material = frame(rng)
-    weights = jnp.asarray(rng.normal(size=(7, 3)))
+    weights = jnp.asarray(rng.normal(size=(18, 3)))
 
     def shade(eye, specular, roughness):
         return shade_glossy(light, made, eye, Material.ggx(0.1, specular, roughness))
 
-    arguments = jnp.asarray(EYE), material.specular, material.roughness
+    arguments = jnp.asarray(EYE), material.specular, material.lobe[1]
     along = tuple(jnp.asarray(rng.normal(size=a.shape)) for a in arguments)
     step = 1e-5
 
@@ -184,6 +215,6 @@ def test_what_does_not_take_it_says_so(unchecked, rng):
         shade_glossy(light, made, EYE, rough, normalized=False)
     with pytest.raises(ValueError, match="tiles take the same lobe at every vertex"):
         adaptive.shade(light, made, EYE, rough, adaptive.Tiles())
-    sun = sphere.Suns([[0.0, 0.0, 1.0]], [1e-4], [[1.0, 1.0, 1.0]])
+    sun = sphere.Suns(jnp.ones((1, 3)), jnp.full(1, 1e-4), jnp.ones((1, 3)))
     with pytest.raises(ValueError, match=r"give shade_glossy suns\.harmonics"):
         shade_sun(sun, made, material=rough, eye=EYE, shadows=False)
