@@ -23,7 +23,7 @@ from ._compressed import CompressedTransfer, index_type
 from ._stored import StoredTransfer
 from ._transfer import Transfer
 
-# Points that clusters are found from: more change the error by less than a hundredth of it.
+# Points that clusters are found from, at most, so that more of them take no more time there.
 _LEARNED_FROM = 2**17
 # Numbers of a block: products of its points with what all clusters have.
 _BLOCK = 2**22

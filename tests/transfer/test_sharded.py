@@ -54,13 +54,6 @@ def test_what_fills_up_sees_nothing(made):
     np.testing.assert_array_equal(shared.neighbors[V:], [[V, V]])
 
 
-def test_what_fills_up_a_compressed_transfer_is_black(made, light):
-    small = transfer.compress(made, clusters=3, components=2)
-    shared = small.sharded(DEVICES)
-    assert (shared.num_points, shared.num_clusters) == (W, 4)
-    check_same(transfer.shade_diffuse, (light, shared, 0.5), (light, small, 0.5))
-
-
 def check_same(function, shared, plain):
     """Calls it with arguments that are shared out, and with what they were before."""
     compiled = jax.jit(function).lower(*shared).compile()
@@ -71,6 +64,22 @@ def check_same(function, shared, plain):
     # Of colors up to 1.3, by sums in another order; 1.2e-7 was met.
     np.testing.assert_allclose(np.asarray(colors)[:V], expected, rtol=0, atol=3e-7)
     assert not np.asarray(colors)[V:].any()
+
+
+def test_what_fills_up_a_compressed_transfer_is_of_a_black_cluster(made):
+    small = transfer.compress(made, clusters=3, components=2)
+    shared = small.sharded(DEVICES)
+    assert (shared.num_points, shared.num_clusters) == (W, 4)
+    np.testing.assert_array_equal(shared.cluster[V:], 3)
+    assert not np.any(shared.scales[3])
+    np.testing.assert_array_equal(shared.codes[:3], small.codes)
+    np.testing.assert_array_equal(shared.weights[:, :V], small.weights)
+
+
+@pytest.mark.slow
+def test_a_compressed_transfer_is_shaded_on_devices(made, light):
+    small = transfer.compress(made, clusters=3, components=2)
+    check_same(transfer.shade_diffuse, (light, small.sharded(DEVICES), 0.5), (light, small, 0.5))
 
 
 EYE = np.array([0.3, -2.0, 1.5], np.float32)

@@ -100,11 +100,22 @@ def test_its_gradient(frame):
     check_sharded(jax.grad(loss, 1), arguments, specs, WHOLE, exchange=total)
 
 
-def test_clusters(frame, rng):
-    light, made, eye, material = frame
+def clusters_of(made):
+    """The transfer in clusters, and its specs."""
     small = compress(made, clusters=2, components=2)
-    specs = specs_of(small, (COLUMNS, ROWS, WHOLE, WHOLE, ROWS, ROWS, ROWS))
+    return small, specs_of(small, (COLUMNS, ROWS, WHOLE, WHOLE, ROWS, ROWS, ROWS))
+
+
+def test_clusters(frame):
+    light, made, _, material = frame
+    small, specs = clusters_of(made)
     check_sharded(shade_diffuse, (light, small, material.diffuse), (WHOLE, specs, ROWS), ROWS)
+
+
+@pytest.mark.slow
+def test_glossy_light_on_clusters(frame):
+    light, made, eye, material = frame
+    small, specs = clusters_of(made)
     check_sharded(shade_glossy, (light, small, eye, material), (WHOLE, specs, WHOLE, ROWS), ROWS)
 
 
