@@ -26,11 +26,12 @@ def write_relit(
 ) -> Path:
     """Write a mesh to a GLB or PLY file as it is shaded, and return the path.
 
-    What is seen there is `tone_map(radiance, exposure)`, whatever lights the program has. A GLB
-    says so by the extension KHR_materials_unlit, which three.js, Babylon.js, model-viewer, Blender
-    and Unreal know; its vertex colors are linear floats, and light at texels is a texture of 8 bits
-    inside. A PLY has vertex colors as sRGB in 8 bits, as MeshLab and Blender take them. Positions
-    and normals are written as by `geometry.write_mesh`, UV only where they place a texture.
+    What is seen of vertices and texels is `tone_map(radiance, exposure)`, linear between them,
+    whatever lights the program has. A GLB says so by the extension KHR_materials_unlit, which
+    three.js, Babylon.js and Blender know; its vertex colors are linear floats, and light at texels
+    is a texture of 8 bits inside. A PLY has vertex colors as sRGB in 8 bits, as MeshLab and
+    trimesh take them. Positions and normals are written as by `geometry.write_mesh`, UV only where
+    they place a texture.
 
     **Arguments**
 
