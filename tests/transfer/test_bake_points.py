@@ -159,6 +159,45 @@ def test_texels_of_a_convex_body_have_no_shadow():
         assert not baked(atlas, 2, scene=lined).coefficients.any()
 
 
+def torus(rows: int, columns: int) -> Mesh:
+    """Around z, of radii 1 and 1/2, with the torus's own normals."""
+    around, across = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
+    u, v = 2 * np.pi * around / rows, 2 * np.pi * across / columns
+    normals = np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], axis=-1)
+    middle = np.stack([np.cos(u), np.sin(u), 0 * u], axis=-1)
+    after, beside = (around + 1) % rows, (across + 1) % columns
+    a, b, c, d = (
+        (i * columns + j).ravel()
+        for i, j in ((around, across), (after, across), (after, beside), (around, beside))
+    )
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return bodies.by_hand((middle + normals / 2).reshape(-1, 3), faces, normals.reshape(-1, 3))
+
+
+@pytest.mark.slow
+def test_texels_of_a_coarse_torus_are_nearer_to_the_round_one_than_its_vertices():
+    """Against points on the torus itself, among far finer faces."""
+    coarse, rng = torus(24, 16), np.random.default_rng(1)
+    atlas = texels_at(coarse, rng.integers(768, size=200), rng.dirichlet(np.ones(3), 200))
+    places = np.asarray(atlas.positions, float)
+    ring = places * [1, 1, 0]
+    ring /= np.linalg.norm(ring, axis=1, keepdims=True)
+    normals = places - ring
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    exact = baked(
+        Points(jnp.asarray(ring + normals / 2, jnp.float32), jnp.asarray(normals, jnp.float32)),
+        scene=torus(200, 100),
+        directions=1024,
+        offset=5e-4,
+    ).coefficients
+    by_texel = baked(atlas, directions=1024).coefficients
+    by_vertex = atlas.carry(baked(coarse, directions=1024).coefficients)
+    assert relative(by_texel, exact) < 0.011  # 1.05e-2 measured
+    assert relative(by_vertex, exact) > 0.024  # 2.5e-2
+    flat = baked(Points(atlas.positions, atlas.normals), scene=coarse, directions=1024)
+    assert relative(by_texel, exact) < 0.9 * relative(flat.coefficients, exact)  # 0.86
+
+
 OPENING = np.radians(60)
 
 
