@@ -194,7 +194,7 @@ export class Viewer {
     const place = [(2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height];
     const ray = rayAt(this.shared.camera, x === undefined ? [0, 0] : place, width / height);
     const vertex = pointUnder(this.scene, ray);
-    if (vertex === null && x === undefined) this.overlay.say("No vertex in the middle");
+    if (vertex === null && x === undefined) this.overlay.say("Nothing in the middle");
     this.set({ vertex });
   }
 
