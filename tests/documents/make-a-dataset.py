@@ -2,6 +2,6 @@
 
 from experiments.runner.cli import main
 
-options = "--size 160 --folder dataset --directions 32 --bounces 0 --views 3 --no-progress"
+options = "--size 160 --folder dataset --directions 32 --bounces 1 --views 3 --no-progress"
 if main(["run", "dataset", *options.split()]):
     raise SystemExit("the experiment did not run")

@@ -21,7 +21,7 @@ from experiments.runner import UserError
 from jaxsh import geometry, harmonics, imaging, transfer
 
 _SMALL = [
-    *("--views", "2", "--turns", "1", "--suns", "1", "--size", "24", "--samples", "1"),
+    *("--views", "2", "--turns", "2", "--suns", "0", "--size", "24", "--samples", "1"),
     *("--degree", "2", "--directions", "16", "--bounces", "1", "--mesh", "knot"),
 ]
 
