@@ -31,7 +31,7 @@ class Compression:
     """degree of light and transfer"""
     directions: int = 1024
     """directions of the bake"""
-    sizes: tuple[tuple[int, int], ...] = ((64, 8), (256, 8), (256, 16), (512, 12))
+    sizes: tuple[tuple[int, int], ...] = ((64, 8), (256, 8), (256, 16), (512, 24))
     """clusters and components"""
     exponent: float = 32.0
     """of the glossy lobe"""

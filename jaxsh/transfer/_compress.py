@@ -34,7 +34,7 @@ def compress(
     transfer: Transfer | StoredTransfer,
     *,
     clusters: int | None = None,
-    components: int = 8,
+    components: int | None = None,
     iterations: int = 16,
     seed: int = 0,
     progress: bool = True,
@@ -56,8 +56,8 @@ def compress(
       than 131,072 points, or 64 a cluster, so many that the seed chooses form the clusters.
     - `clusters`: by default one for 128 points, at most 256. All clusters together take
       2 (1 + components) K bytes each.
-    - `components`: weights of each point, of a byte each, at most K; beside them a point has the
-      number of its cluster, in one or two bytes.
+    - `components`: weights of each point, of a byte each, at most K, by default 16 where there are
+      as many; beside them a point has the number of its cluster, in one or two bytes.
     - `iterations`: assignments of all points, each of about 2 V · clusters · components · K
       operations.
     - `seed`: of the points that the clusters start from. The same one gives the same result on the
@@ -89,10 +89,10 @@ def compress(
     count, width = transfer.num_points, (transfer.degree + 1) ** 2
     if not count:
         raise ValueError("expected a transfer of one point or more, got none")
-    components, iterations = (
-        check_size("components", components),
-        check_size("iterations", iterations),
-    )
+    if components is None:
+        components = min(16, width)
+    components = check_size("components", components)
+    iterations = check_size("iterations", iterations)
     if clusters is None:
         clusters = min(256, math.ceil(count / 128))
     clusters = check_size("clusters", clusters)

@@ -52,6 +52,8 @@ def coefficients(transfer):
 def test_clusters_that_are_planes_are_found(made, small):
     # A weight is rounded to 1/254 of the largest of its cluster, a component to 1/65,534.
     assert np.abs(coefficients(small) - made.coefficients).max() < 0.02
+    by_default = compress(made, iterations=1)
+    assert (by_default.num_clusters, by_default.num_components) == (1, K)
     counts = np.bincount(small.cluster, minlength=CLUSTERS)
     np.testing.assert_array_equal(counts, 20)
     assert (small.num_clusters, small.num_components, small.degree) == (CLUSTERS, COMPONENTS, 2)
