@@ -90,7 +90,7 @@ def calls():
         "shade_glossy": of(t.shade_glossy, light, made, eye, material()),
         "shade_glossy, own lights": of(t.shade_glossy, own, made, eye, material()),
         "shade_glossy, sampled": of(t.shade_glossy, light, sampled, eye, material()),
-        "shade_glossy, rough": of(t.shade_glossy, light, made, eye, rough),
+        "shade_glossy, rough": of(t.shade_glossy, floats(3, 9), baked(degree=2), eye, rough),
         "shade_sun": of(sunny, discs, made, booleans(V, 16, 16), albedo),
         "shade_sun.glossy": of(shining, suns(), made, booleans(V, 16, 16), eye, material()),
         "unshadowed": of(
