@@ -111,9 +111,11 @@ def ggx_table(degree: int) -> Float[np.ndarray, "i rows j"]:
     system[:, :-1, -1] = system[:, -1, :-1] = gathered[0, :, :, 0]
     norms = np.sqrt((2 * np.arange(bands) + 1) / (4 * np.pi))
 
+    # As many angles at once as their basis takes some 32 MB for.
+    parts = np.array_split(cosine, -(-len(cosine) * math.prod(_HALFWAYS) * bands**2 // 2**22))
     values = np.zeros((len(roughness), 2 * bands + 2, len(cosine)))
     for i, one in enumerate(roughness):
-        reflected = np.stack([_reflected(one, towards, degree) for towards in cosine])
+        reflected = np.concatenate([_reflected(one, some, degree) for some in parts])
         uniform = reflected[:, :, 0, 0]
         reflected = _UNIFORM * reflected / uniform[:, :, None, None]
         right = np.einsum("svlk,vfsk->vlf", gathered, reflected)
@@ -143,8 +145,7 @@ def _seen(directions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "4 n"]:
 def _basis(directions: Float[np.ndarray, "n 3"], degree: int) -> Float[np.ndarray, "k n"]:
     x, y, z = directions.T
     turned = np.exp(1j * np.arange(degree + 1)[:, None] * np.arctan2(y, x))
-    m = orders(degree)
-    azimuth = np.where((m < 0)[:, None], turned.imag[np.abs(m)], turned.real[np.abs(m)])
+    azimuth = np.concatenate([turned.imag[:0:-1], turned.real])[orders(degree) + degree]
     return legendre(np.clip(z, -1, 1), degree) * azimuth
 
 
@@ -168,7 +169,9 @@ def _gathered(cosine: Float[np.ndarray, " v"], degree: int) -> Float[np.ndarray,
     return np.einsum("sn,vnl,kn->svlk", values, bands / (4 * np.pi), nodes.project, optimize=True)
 
 
-def _reflected(roughness: float, cosine: float, degree: int) -> Float[np.ndarray, "2 4 k"]:
+def _reflected(
+    roughness: float, cosine: Float[np.ndarray, " v"], degree: int
+) -> Float[np.ndarray, "v 2 4 k"]:
     """Integrates the BRDF times cosine and basis, for F_0 = 1 and for F_0 = 0.
 
     Over halfway vectors that the microfacets' distribution itself draws, so that a smooth surface
@@ -179,20 +182,23 @@ def _reflected(roughness: float, cosine: float, degree: int) -> Float[np.ndarray
     u, weights = leggauss(_HALFWAYS[0])
     u, weights = (u + 1) / 2, weights / 2
     phi = (np.arange(_HALFWAYS[1]) + 0.5) * 2 * np.pi / _HALFWAYS[1]
+    weights = np.repeat(weights, len(phi)) / len(phi)
     z = 1 / np.sqrt(1 + square * u / (1 - u))[:, None]
     r = np.sqrt(1 - z * z)
     halfway = np.stack([r * np.cos(phi), r * np.sin(phi), z + 0 * phi], -1).reshape(-1, 3)
-    eye = np.array([np.sqrt(1 - cosine * cosine), 0, cosine])
-    along = halfway @ eye
-    incoming = 2 * along[:, None] * halfway - eye
-    lit = (along > 0) & (incoming[:, 2] > 0)
-    halfway, along, incoming = halfway[lit], along[lit], incoming[lit]
-    weights = np.repeat(weights, len(phi))[lit] / len(phi)
+    eyes = np.stack([np.sqrt(1 - cosine * cosine), 0 * cosine, cosine], axis=1)
+    along = eyes @ halfway.T
+    incoming = 2 * along[..., None] * halfway - eyes[:, None]
+    lit = (along > 0) & (incoming[..., 2] > 0)
 
     def hidden(z):
         return (np.sqrt(1 + square * (1 / z**2 - 1)) - 1) / 2
 
-    shadowing = 1 / (1 + hidden(cosine) + hidden(incoming[:, 2]))
-    share = weights * shadowing * along / (cosine * halfway[:, 2])
-    fresnel = np.stack([np.ones_like(along), (1 - along) ** 5])
-    return (fresnel[:, None] * share * _seen(incoming)) @ _basis(incoming, degree).T
+    masked = hidden(cosine)[:, None] + hidden(np.where(lit, incoming[..., 2], 1))
+    share = weights * along / (1 + masked) / (cosine[:, None] * halfway[:, 2])
+    share = np.where(lit, share, 0)
+    flat = incoming.reshape(-1, 3)
+    seen = _seen(flat).reshape(4, *lit.shape).swapaxes(0, 1) * share[:, None]
+    fresnel = np.stack([np.ones_like(along), np.where(lit, 1 - along, 0) ** 5], axis=1)
+    basis = np.moveaxis(_basis(flat, degree).reshape(-1, *lit.shape), 0, 2)
+    return fresnel[:, :, None] * seen[:, None] @ basis[:, None]
