@@ -4,7 +4,7 @@ python tools/measure_viewer.py [--vertices 50000] [--degree 10] [--chromium-opti
 python tools/measure_viewer.py --texels 256 [--degree 10]
 
 The second is of a square of 256 × 256 texels with a texture of 1024 × 1024, and a knot that stands
-in its light.
+in its light; with `--clusters 64` its transfer is compressed.
 
 Needs the package playwright and a Chromium that is installed; `CHROMIUM=path` names one. As it
 stands all is drawn in software (SwiftShader), so that every machine can say something; with
@@ -99,13 +99,17 @@ def square(side: int) -> geometry.Texels:
     return geometry.texels(mesh, side)
 
 
-def main(vertices: int, texels: int, degree: int, options: str, seconds: float) -> None:
+def main(
+    vertices: int, texels: int, clusters: int, degree: int, options: str, seconds: float
+) -> None:
     from playwright.sync_api import sync_playwright
 
     if texels:
         surface = square(texels)
         before = geometry.ray_scene([surface.mesh, geometry.knot(2000)])
         made = transfer.bake(surface, degree, directions=256, scene=before, progress=False)
+        if clusters:
+            made = transfer.compress(made, clusters=clusters, components=8, progress=False)
     else:
         surface = geometry.knot(vertices)
         made = transfer.unshadowed(surface.vertices, surface.normals, degree)
@@ -137,8 +141,16 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Count changes of light a second.")
     parser.add_argument("--vertices", type=int, default=50_000)
     parser.add_argument("--texels", type=int, default=0, help="along a side, instead of vertices")
+    parser.add_argument("--clusters", type=int, default=0, help="of the texels' transfer")
     parser.add_argument("--degree", type=int, default=10)
     parser.add_argument("--chromium-options", default=SOFTWARE)
     parser.add_argument("--seconds", type=float, default=3.0)
     given = parser.parse_args()
-    main(given.vertices, given.texels, given.degree, given.chromium_options, given.seconds)
+    main(
+        given.vertices,
+        given.texels,
+        given.clusters,
+        given.degree,
+        given.chromium_options,
+        given.seconds,
+    )

@@ -15,7 +15,7 @@ from .._core.checks import as_path
 from .._core.files import check_place, put_in_place
 from ..geometry import Mesh, Texels
 from ..imaging import Camera
-from ..transfer import Material, Transfer
+from ..transfer import CompressedTransfer, Material, Transfer
 from ._lamp import Lamp
 from ._scene import make_scene
 from ._script import script, styles, text
@@ -24,7 +24,7 @@ from ._sky import Sky
 
 def export_html(
     path: str | os.PathLike[str],
-    transfer: Transfer,
+    transfer: Transfer | CompressedTransfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
     faces: Int[ArrayLike, "f 3"] | Mesh | Texels,
     albedo: Float[ArrayLike, "..."] | Material | None = None,
@@ -54,7 +54,8 @@ def export_html(
 
     - `path`: of the file, which is replaced. Missing folders are made.
     - `transfer`: of the V vertices of a mesh, as from `transfer.bake` or `unshadowed`, whose
-      positions are the mesh's; or of the V texels of a picture over one.
+      positions are the mesh's; or of the V texels of a picture over one. That of
+      `transfer.compress` makes the file smaller; the page unpacks it.
     - `light`: coefficients (3, K), or (n, 3, K) for several that a menu chooses from; of degree 10
       and the transfer's at most. What the transfer has beyond the light's degree is not written.
       None with a sky or a lamp alone, which are of the transfer's degree.

@@ -18,7 +18,7 @@ from .._core.checks import (
 )
 from ..geometry import Mesh, Texels
 from ..imaging import Camera, auto_exposure
-from ..transfer import Material, Transfer
+from ..transfer import CompressedTransfer, Material, Transfer
 from ._gloss import gloss_facts, split_material
 from ._lamp import Lamp
 from ._lights import make_lights, shaded
@@ -34,13 +34,14 @@ _MOST_CODE = 32767  # of int16
 class Scene(NamedTuple):
     """Holds a header, which JSON takes, and the bytes of the arrays that it names, in order.
 
-    Beside these, what was drawn and with which albedo, for a picture by Python.
+    Beside these, what was drawn, with which albedo and transfer, for a picture by Python.
     """
 
     header: dict[str, Any]
     arrays: bytes
     surface: Surface
     albedo: Any
+    transfer: Transfer
 
 
 class Codes(NamedTuple):
@@ -51,7 +52,7 @@ class Codes(NamedTuple):
 
 
 def make_scene(
-    transfer: Transfer,
+    transfer: Transfer | CompressedTransfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
     faces: Int[ArrayLike, "f 3"] | Mesh | Texels,
     albedo: Float[ArrayLike, "..."] | Material | None,
@@ -66,10 +67,13 @@ def make_scene(
     lamp: Lamp | None,
 ) -> Scene:
     """Check all and pack it; raises `ValueError` or `TypeError` for what does not fit."""
-    check_type("transfer", transfer, Transfer)
+    check_type("transfer", transfer, Transfer, CompressedTransfer)
     known = {"transfer": transfer, "albedo": albedo, "values": values, "camera": camera}
     for name, value in known.items():
         check_known(name, value)
+    small = transfer if isinstance(transfer, CompressedTransfer) else None
+    if isinstance(transfer, CompressedTransfer):
+        transfer = transfer.decompressed()
     lights = make_lights(light, sky, lamp, transfer)
     count = transfer.num_points
     if count > _ROW * _MOST_ROWS:
@@ -124,8 +128,12 @@ def make_scene(
     arrays = lights.arrays | {
         "positions": positions.astype("<f4"),
         "faces": corners.astype("<u4"),
-        "transfer": layers.astype("<i2"),
     }
+    if small is None:
+        arrays["transfer"] = layers.astype("<i2")
+    else:
+        header["clusters"] = {"points": count, "components": small.num_components}
+        arrays |= in_clusters(small, len(rounded.scales))
     if material is not None:
         normals = np.asarray(transfer.normals)
         defined = np.isfinite(normals).all(axis=1, keepdims=True)
@@ -133,7 +141,7 @@ def make_scene(
     if codes is not None:
         arrays["albedoCodes"] = codes.astype("<u2")
     named, joined = packed(header, arrays | surface.arrays | value_codes)
-    return Scene(named, joined, surface, reflects)
+    return Scene(named, joined, surface, reflects, transfer)
 
 
 def packed(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> tuple[dict[str, Any], bytes]:
@@ -173,6 +181,17 @@ def in_layers(codes: np.ndarray, rows: int) -> np.ndarray:
     texels = np.zeros((rows * _ROW, layers * 4), np.int16)
     texels[:count, :width] = codes
     return texels.reshape(rows * _ROW, layers, 4).swapaxes(0, 1)
+
+
+def in_clusters(transfer: CompressedTransfer, width: int) -> dict[str, np.ndarray]:
+    """List what the page makes the first `width` coefficients of each point from."""
+    codes = np.asarray(transfer.codes)[..., :width]
+    return {
+        "weights": np.asarray(transfer.weights),
+        "clusterOf": np.asarray(transfer.cluster).astype("<u2"),
+        "clusterCodes": np.ascontiguousarray(codes).astype("<i2"),
+        "clusterScales": np.asarray(transfer.scales).astype("<f4"),
+    }
 
 
 def _ball_around(positions: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, float]:

@@ -9,6 +9,7 @@ _MODULES = (
     *(
         "harmonics",
         "vectors",
+        "clusters",
         "scene",
         "pictures",
         "sides",

@@ -11,7 +11,7 @@ from jaxtyping import ArrayLike, Float, Int
 from .._core.checks import check_size
 from ..geometry import Mesh, Texels
 from ..imaging import Camera
-from ..transfer import Material, Transfer
+from ..transfer import CompressedTransfer, Material, Transfer
 from ._lamp import Lamp, checked_place
 from ._lights import checked_lights
 from ._scene import Scene, make_scene
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def view(
-    transfer: Transfer,
+    transfer: Transfer | CompressedTransfer,
     light: Float[ArrayLike, "*lights 3 k"] | None,
     faces: Int[ArrayLike, "f 3"] | Mesh | Texels,
     albedo: Float[ArrayLike, "..."] | Material | None = None,
@@ -82,7 +82,7 @@ def view(
         lamp=lamp,
     )
     return _widget_class()(
-        scene, height, Still(transfer, scene.surface, scene.albedo, height, lamp)
+        scene, height, Still(scene.transfer, scene.surface, scene.albedo, height, lamp)
     )
 
 

@@ -184,6 +184,16 @@ def test_a_lost_context_comes_back(page):
     np.testing.assert_array_equal(colors(page), before)
 
 
+def test_transfer_in_clusters_is_unpacked(browser, tmp_path):
+    mesh, made, light, albedo = pages.example(300, 4)
+    small = transfer.compress(made, clusters=6, components=5)
+    path = viewer.export_html(tmp_path / "small.html", small, light, mesh.faces, albedo)
+    page = opened(browser, path, [])
+    shaded = transfer.shade_diffuse(light, small.decompressed(), albedo)
+    assert abs(levels(colors(page)) - levels(shaded)).max() < 0.1
+    page.context.close()
+
+
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844)])
 def test_all_of_the_panel_can_be_reached(page, size):
     page.set_viewport_size({"width": size[0], "height": size[1]})

@@ -171,3 +171,18 @@ def test_the_widgets_picture_has_the_base_color(at, texels):
     apart = abs(picture[..., :3] - expected).max(axis=-1)[inside]
     assert expected[inside].std() > 10
     assert np.median(apart) < 1  # four samples, and one
+
+
+def test_transfer_in_clusters_is_sent_as_it_is(tmp_path):
+    mesh, made, light, _ = pages.example(300, 4)
+    small = transfer.compress(made, clusters=4, components=5)
+    page = viewer.export_html(tmp_path / "c.html", small, light[:, :16], mesh, 0.5, exposure=1.0)
+    header, arrays = arrays_of(page)
+    assert "transfer" not in arrays
+    assert header["clusters"] == {"points": 300, "components": 5}
+    # As the page unpacks it.
+    codes = arrays["clusterCodes"].reshape(4, 6, 16) * arrays["clusterScales"].reshape(4, 6, 1)
+    weights = np.concatenate([np.ones((1, 300)), arrays["weights"].reshape(5, 300)])
+    found = np.einsum("iv,vik->vk", weights, codes[arrays["clusterOf"]])
+    expected = np.asarray(small.decompressed().coefficients)[:, :16]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5)

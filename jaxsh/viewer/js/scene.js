@@ -1,7 +1,9 @@
 // What Python sends: a header, and arrays one after the other.
+import { expanded } from "./clusters.js";
 
 const KINDS = {
-  f4: Float32Array, i2: Int16Array, i4: Int32Array, u1: Uint8Array, u2: Uint16Array, u4: Uint32Array,
+  f4: Float32Array, i1: Int8Array, i2: Int16Array, i4: Int32Array, u1: Uint8Array, u2: Uint16Array,
+  u4: Uint32Array,
 };
 
 // The header, and its arrays by name over the bytes they are in; no copies. Each begins at a multiple
@@ -17,6 +19,7 @@ export function unpacked(header, bytes) {
   if (start !== bytes.byteLength) {
     throw new Error(`The viewer expected ${start} bytes of data and got ${bytes.byteLength}.`);
   }
+  if (header.clusters) scene.transfer = expanded(scene);
   return scene;
 }
 
