@@ -57,10 +57,10 @@ def bake(
       of which those without normals are of a volume, with visibility alone: ∫ V(ω) y_i(ω) dω over
       the whole sphere, for `fluence`.
     - `degree`: the largest l; K = (degree+1)² coefficients.
-    - `directions`: rays granted, over the whole sphere. About half as many leave a vertex, more
-      where shadows are intricate, fewer where there are none. The coefficients' relative RMS error
-      falls about as its power -3/4; at degree 10 and 2,048 it is 0.4 % on a head and 1.4 % on a
-      statue with fine folds (experiment `sloan2002.first_light`).
+    - `directions`: rays granted, over the whole sphere. About half as many leave a vertex (a point
+      of a volume as many), more where shadows are intricate, fewer where there are none. The
+      coefficients' relative RMS error falls about as its power -3/4; at degree 10 and 2,048 it is
+      0.4 % on a head and 1.4 % on a statue with fine folds (experiment `sloan2002.first_light`).
     - `shadows`: `False` leaves out visibility, and all rays.
     - `bounces`: how often light may be reflected diffusely on its way. Each casts the half
       of an even set of `directions` that leaves a vertex, again from every vertex. Light bounces
@@ -69,8 +69,9 @@ def bake(
     - `albedo`: of the bounces only, a number or one per vertex of that mesh. Backs of faces reflect
       nothing, and neither do further meshes of a `scene`.
     - `ray_bias`: where rays start along the normal, as a share of half the mesh's longest extent
-      along an axis, the same at each vertex. By default 1e-5 of it, and at most 1/1000 of the
-      vertex's shortest edge and half of the gap to the next surface above it. Never less than 4
+      along an axis (of points under a scene of rays, theirs), the same at each vertex. By default
+      1e-5 of it, and at most 1/1000 of the vertex's shortest edge and half of the gap to the next
+      surface above it. Never less than 4
       times what coordinates are rounded to: a surface nearer than that casts no shadow. Larger
       ones lose fine shadows; one `UserWarning` says where they pass 1/10 of the shortest edge.
     - `offset`: the same as a distance in the unit of the vertices, in place of `ray_bias`.
@@ -79,7 +80,7 @@ def bake(
       latter. `Points` stop no rays, and need one of the two; for bounces a `Mesh`. By default
       `geometry.ray_scene(mesh)`, which casts by JAX where Embree is not installed.
     - `device`: `True` casts the rays on JAX's default device, in one program for each of a few
-      chunks of vertices, and the coefficients stay there; a `scene` must then be a
+      chunks of points, and the coefficients stay there; a `scene` must then be a `Mesh` or a
       `geometry.JaxRayScene`, on whose device it is done. `False` casts them on the host. By default
       they are cast on a GPU or TPU where that is the default device and `scene` allows it. The two
       differ where rays graze an edge, by far less than two seeds do (experiment `devices.bake`).
