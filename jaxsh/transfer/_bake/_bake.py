@@ -71,9 +71,9 @@ def bake(
     - `ray_bias`: where rays start along the normal, as a share of half the mesh's longest extent
       along an axis (of points under a scene of rays, theirs), the same at each vertex. By default
       1e-5 of it, and at most 1/1000 of the vertex's shortest edge and half of the gap to the next
-      surface above it. Never less than 4
-      times what coordinates are rounded to: a surface nearer than that casts no shadow. Larger
-      ones lose fine shadows; one `UserWarning` says where they pass 1/10 of the shortest edge.
+      surface above it. Never less than 4 times what coordinates are rounded to: a surface nearer
+      than that casts no shadow. Larger ones lose fine shadows; one `UserWarning` says where they
+      pass 1/10 of the shortest edge.
     - `offset`: the same as a distance in the unit of the vertices, in place of `ray_bias`.
     - `scene`: the surfaces that stop rays, in place of the mesh, or that of the texels, alone:
       another `Mesh`, or any `geometry.RayScene`. For bounces the mesh must be the first in the
