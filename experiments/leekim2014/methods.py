@@ -77,7 +77,7 @@ def adaptive_way(scene: Scene, method: Method, **options: Any) -> Way:
     elif method == "probes":
         made = adaptive.Anchors(adaptive.make_anchors(scene.baked), **options)
     else:
-        exponent = float(scene.material.exponent)
+        exponent = float(scene.material.lobe[1])
         tiles = adaptive.make_tiles(scene.baked, scene.eye, exponent=exponent)
         made = adaptive.Tiles(tiles, **options)
     return lambda light: adaptive.shade(light, baked, scene.eye, scene.material, made)

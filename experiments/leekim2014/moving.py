@@ -23,7 +23,7 @@ def moving(context: Context, scene: Scene, frames: int, views: int, step: float)
     path = eyes(scene, frames + 1, step)
     low, high = jnp.min(scene.baked.positions, axis=0), jnp.max(scene.baked.positions, axis=0)
     distance = float(jnp.linalg.norm(path[0] - (low + high) / 2))
-    exponent = float(scene.material.exponent)
+    exponent = float(scene.material.lobe[1])
     make = functools.partial(
         adaptive.make_tile_atlas, distance=distance, views=views, exponent=exponent
     )

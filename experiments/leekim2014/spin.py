@@ -60,7 +60,7 @@ def methods(
     anchors = make_anchors(scene.baked, diffuse=scene.baked)
     center = (jnp.max(scene.baked.positions, axis=0) + jnp.min(scene.baked.positions, axis=0)) / 2
     distance = float(jnp.linalg.norm(scene.eye - center))
-    exponent = float(scene.material.exponent)
+    exponent = float(scene.material.lobe[1])
     atlas = make_tile_atlas(scene.baked, distance=distance, views=views, exponent=exponent)
     degree = round(0.7 * scene.row.degree)
 
