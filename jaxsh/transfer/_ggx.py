@@ -22,6 +22,7 @@ _BLOCK = 1024  # vertices whose terms stay in cache
 _HALFWAYS = 32, 48  # halfway vectors by height and azimuth
 # Keeps the fit from adding what no surface of it sees.
 _STIFFNESS = 1e-6
+_LEAST = 1e-6  # share of light at grazing angles that is told from none
 _UNIFORM = (4 * np.pi) ** -0.5  # what light 1 from all around is integrated with
 
 
@@ -48,7 +49,8 @@ def ggx_lobe(
         most = rows_at_once(math.prod(table.shape[:2]) * dtype.itemsize)
         values = in_blocks(evaluate, cosine, roughness.astype(dtype), size=_BLOCK, most=most)
     white, black = values[:, :bands], values[:, bands : 2 * bands]
-    whole, grazing = values[:, -2:-1], values[:, -1:]
+    # Polynomials overshoot: no surface adds light, and with none of either the lobe would be 0/0.
+    whole, grazing = jnp.clip(values[:, -2:-1], 0, 1), jnp.clip(values[:, -1:], _LEAST, 1)
     normal = jnp.asarray(specular, dtype).reshape(-1, *specular.shape[-1:] or (1,))
     mean = jnp.mean(normal, axis=1, keepdims=True)
     lobe = mean * white + (1 - mean) * grazing * black

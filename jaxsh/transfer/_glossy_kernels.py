@@ -50,6 +50,10 @@ __all__ = [
     "unit",
 ]
 
+# Cosines between normal and eye behind a surface: GGX's share is the horizon's up to the one, and
+# none from the other on.
+_AS_SEEN, _UNSEEN = -0.1, -0.6
+
 
 @functools.partial(jax.jit, static_argnums=3)
 def reflected(
@@ -130,9 +134,12 @@ def reflection(
         raise ValueError(
             "expected normalized=True with a roughness: it is Phong's lobe that has a bare power"
         )
-    # An eye behind the surface sees nothing: what it would see is said for one at the horizon.
-    cosine = jnp.clip(jnp.sum(axis * unit(normals), axis=0), 0, 1)
-    return ggx_lobe(material.roughness, material.specular, cosine, degree)
+    # An eye behind the surface sees nothing. Points just behind a silhouette share faces with those
+    # before it, and so have what is seen at the horizon; farther behind it fades.
+    along = jnp.sum(axis * unit(normals), axis=0)
+    zonal, share = ggx_lobe(material.roughness, material.specular, jnp.clip(along, 0, 1), degree)
+    seen = jnp.clip((along - _UNSEEN) / (_AS_SEEN - _UNSEEN), 0, 1)[:, None]
+    return zonal, share * seen**2 * (3 - 2 * seen)
 
 
 def lobe_polynomial(zonal: Float[Array, "*v bands"]) -> Float[Array, "bands ..."]:

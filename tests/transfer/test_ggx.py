@@ -190,6 +190,21 @@ def test_derivatives_of_what_is_seen(rng):
     assert all(np.abs(slope).max() > 0 for slope in slopes)
 
 
+def test_no_surface_adds_light():
+    """Of uniform light at most all is reflected, at any roughness, and none seen from behind."""
+    cosines = np.concatenate([np.linspace(0, 0.2, 9), np.linspace(0.3, 1, 8), [-0.05, -0.4, -1]])
+    roughness, color, cosine = np.meshgrid([0, 1e-6, 0.08, 0.25, 1], [0, 1e-6, 0.04, 1], cosines)
+    material = Material.ggx(0.0, color.reshape(-1, 1), roughness.ravel())
+    share = (4 * np.pi) ** 0.5 * by_lobe(cosine.ravel(), material)[:, 0].reshape(cosine.shape)
+    assert share[..., :-3].min() >= -1e-12
+    assert share.min() > -0.005  # the lobe's ringing, from behind
+    assert share.max() <= 1 + 1e-9
+    np.testing.assert_array_equal(share[..., -1], 0)
+    # A smooth metal is a mirror, and a dielectric reflects as Schlick says: within 0.7 %.
+    exact = color[:, 0] + (1 - color[:, 0]) * (1 - cosines) ** 5
+    np.testing.assert_allclose(share[:, 0, :-3], exact[:, :-3], rtol=0, atol=0.007)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
