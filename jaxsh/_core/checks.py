@@ -49,8 +49,10 @@ def as_integer(value: Any, name: str) -> Int[Array, "..."]:
 
 
 def as_path(value: Any, name: str = "path") -> Path:
-    """Convert to a path; raises `TypeError` for what is none."""
+    """Convert to a path; raises `TypeError` for what is none, `ValueError` for what no file has."""
     if isinstance(value, str | os.PathLike) and value != "":
+        if "\0" in str(value):
+            raise ValueError(f"expected {name} without a zero byte, got {value!r}")
         return Path(value)
     raise TypeError(f"expected {name} as a string or a path, got {described(value)}")
 

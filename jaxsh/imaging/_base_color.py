@@ -50,7 +50,7 @@ def base_color(mesh: Mesh, at: Raster | Texels | None = None) -> Float[Array, "*
     check_type("mesh", mesh, Mesh)
     if at is not None:
         check_type("at", at, Raster, Texels)
-    _check_materials(mesh)
+    check_materials(mesh)
     if at is None:
         return _at_vertices(mesh)
     if isinstance(at, Raster):
@@ -61,7 +61,8 @@ def base_color(mesh: Mesh, at: Raster | Texels | None = None) -> Float[Array, "*
     return _at_places(mesh, at)
 
 
-def _check_materials(mesh: Mesh) -> None:
+def check_materials(mesh: Mesh) -> None:
+    """Raises `ValueError` where materials lack the UV or the faces that they go by."""
     textured = any(material.texture is not None for material in mesh.materials)
     if textured and mesh.uv is None:
         raise ValueError(

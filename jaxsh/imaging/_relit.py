@@ -12,6 +12,7 @@ from jaxtyping import ArrayLike, Float
 from .._core import srgb
 from .._core.checks import as_finite, as_path, check_choice, check_flag, check_number, check_type
 from ..geometry import BaseColor, Mesh, Texels, write_mesh
+from ._base_color import check_materials
 from ._display import auto_exposure
 
 
@@ -48,8 +49,8 @@ def write_relit(
     - `up`: the axis of the file that points up, as in `write_mesh`.
 
     Runs on the host. Raises `ValueError` for other extensions and shapes, for NaN and infinite
-    values, and for `textured` in a .ply, which has no textures, or without a base color; `OSError`
-    where the file cannot be written.
+    values, and for `textured` in a .ply, which has no textures, without a base color, or where it
+    lacks UV or `face_material`; `OSError` where the file cannot be written.
 
     **Example**
 
@@ -134,6 +135,7 @@ def _lit(path: Path, mesh: Mesh, shown: Float[np.ndarray, "v 3"]) -> Mesh:
         raise ValueError(f"{path}: a .ply has no textures to leave: write a .glb")
     if not mesh.materials and mesh.colors is None:
         raise ValueError(f"{path}: expected a mesh with materials or colors, to be left textured")
+    check_materials(mesh)
     colors = np.concatenate([shown, np.ones_like(shown[:, :1])], axis=1)
     if mesh.colors is not None:
         colors = colors * np.asarray(mesh.colors, np.float64)

@@ -166,6 +166,10 @@ def test_texels_become_a_texture_that_lies_where_they_do(tmp_path, rng):
 
 def test_what_does_not_fit_is_refused_and_nothing_is_left(tmp_path, unchecked):
     mesh = square()
+    picture = BaseColor("picture", texture=np.full((1, 1, 4), 255, np.uint8))
+    blind = square(face_material=jnp.array([0, 0]), materials=(picture,))
+    blind = dataclasses.replace(blind, uv=None)
+    loose = square(materials=(BaseColor("loose"),))
     for message, change in (
         ("cannot write .obj, only .glb and .ply", {"path": tmp_path / "a.obj"}),
         (r"expected radiance \(4, 3\), got shape \(4,\)", {"radiance": np.ones(4)}),
@@ -173,11 +177,16 @@ def test_what_does_not_fit_is_refused_and_nothing_is_left(tmp_path, unchecked):
         ("exposure must be a number > 0", {"exposure": -1.0}),
         ("a .ply has no textures to leave", {"path": tmp_path / "a.ply", "textured": True}),
         ("expected a mesh with materials or colors", {"textured": True}),
+        ("has a texture, but the mesh has no UV", {"surface": blind, "textured": True}),
+        ("1 materials, but no face_material", {"surface": loose, "textured": True}),
     ):
         given = {"path": tmp_path / "a.glb", "surface": mesh, "radiance": RADIANCE} | change
         with pytest.raises(ValueError, match=message):
             imaging.write_relit(given.pop("path"), given.pop("surface"), **given)
     assert list(tmp_path.iterdir()) == []
+    (tmp_path / "ü").touch()
+    with pytest.raises(NotADirectoryError, match=r"ü/a\.glb: cannot be written: a file stands"):
+        imaging.write_relit(tmp_path / "ü" / "a.glb", mesh, RADIANCE)
 
 
 def test_unlit_survives_a_file_and_is_said_where_it_cannot(tmp_path):
