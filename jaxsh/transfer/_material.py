@@ -126,12 +126,12 @@ class Material(eqx.Module):
         and shadowing, and Schlick's Fresnel term. `specular` is the reflectance along the normal:
         a metal's color, or 0.04 for a dielectric of index 1.5. For a metal `diffuse` is 0.
 
-        Glossy shading takes a lobe around the mirrored direction. This one is fitted, least
-        squares at the light's degree, for each roughness and angle of view. It reflects of uniform
-        light what GGX does, to 1 %; its shape is off by what `docs/glossy.md` says. Arguments of V
-        vertices or texels, as for `Material`; differentiable in each, and through the angle in eye
-        and normals. The table of a degree is fitted at its first use in a process, which takes
-        about a second at degree 10 and fifteen at 20.
+        Glossy shading takes a lobe around the mirrored direction. This one is fitted, least squares
+        at the light's degree, for each roughness and angle of view. It reflects of uniform light
+        what GGX does, to 1 %, at the horizon to 3 %; its shape is off by what `docs/glossy.md`
+        says. Arguments of V vertices or texels, as for `Material`; differentiable in each, and
+        through the angle in eye and normals. The table of a degree is fitted at its first use in a
+        process, which takes about a second at degree 10 and fifteen at 20.
 
         Raises `ValueError` as `Material` does.
 
