@@ -14,7 +14,7 @@ _ON_EDGE = 1e-6
 _INSIDE = 0.01
 # Twice the area of the smallest face that has one.
 _AREA = 1e-9
-# Shorter sums of unit normals have no direction: the face's own stands in.
+# Shorter sums of unit normals have no direction, nor have infinite ones: the face's own stands in.
 _SHORT = 1e-6
 # Pairs of a face and a texel that are looked at together.
 _BLOCK = 1 << 20
@@ -105,10 +105,11 @@ def places(
     at = faces[face]
     corners, around = vertices[at].astype(np.float64), normals[at].astype(np.float64)
     positions = np.einsum("nkc,nk->nc", corners, weights)
-    mean = np.einsum("nkc,nk->nc", around, weights)
-    length = np.linalg.norm(mean, axis=1, keepdims=True)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    mean = np.where(length > _SHORT, mean, across)
+    with np.errstate(invalid="ignore"):  # of infinite ones
+        mean = np.einsum("nkc,nk->nc", around, weights)
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+    mean = np.where((length > _SHORT) & np.isfinite(length), mean, across)
     length = np.linalg.norm(mean, axis=1, keepdims=True)
     return positions, mean / np.maximum(length, np.finfo(np.float64).tiny)
 

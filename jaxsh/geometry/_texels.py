@@ -173,9 +173,10 @@ def texels(
     Runs on the host, outside `jit`; same result whenever it is run. Not differentiable itself:
     `texels.carry(vertices)` are positions that differentiate.
 
-    Raises `ValueError` for UV that overlap, that leave the picture by more than half a texel, or
-    have no area at all, and `ImportError` where xatlas is needed and missing. One `UserWarning`
-    counts the faces without area in UV, which are on no texel, and charts too small to get one.
+    Raises `ValueError` for vertices that are not finite, for UV that overlap, that leave the
+    picture by more than half a texel, or have no area at all, and where faces have none or xatlas's
+    charts no room; and `ImportError` where xatlas is needed and missing. One `UserWarning` counts
+    the faces without area in UV, which are on no texel, and charts too small to get one.
 
     **Example**
 
@@ -197,12 +198,15 @@ def texels(
     if not len(faces):
         raise ValueError("expected a mesh with faces, got one without")
     check_faces("the mesh", faces, mesh.vertices.shape[0])
+    if bad := int((~np.isfinite(np.asarray(mesh.vertices)).all(axis=1)).sum()):
+        raise ValueError(f"the mesh has {bad} NaN or infinite vertices; make_mesh drops such")
     vertex = np.arange(mesh.vertices.shape[0], dtype=np.int32)
     own = mesh.uv is not None and not unwrap
     if not own:
         mesh, vertex = unwrapped(mesh, width, height, gutter)
         faces = np.asarray(mesh.faces)
     uv = np.asarray(mesh.uv, np.float64)
+    uv = np.where(np.isfinite(uv), uv, np.nan)  # one kind, of which NumPy says nothing
     corners = uv[faces]
     if own:
         _check_range(corners, width, height)

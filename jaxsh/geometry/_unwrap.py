@@ -35,9 +35,15 @@ def unwrap(mesh: Mesh, width: int, height: int, gutter: int) -> tuple[Mesh, Int[
     # A gutter along the picture's rim too: look-ups that repeat it reach across.
     size = min(width, height)
     rim = min(gutter, (size - 1) // 4)
-    inner, apart = _pack(charts, size - 2 * rim, gutter)
+    packed = _pack(charts, size - 2 * rim, gutter)
+    if packed is None:
+        raise ValueError(
+            f"expected a resolution at which the {charts.number:,} charts that xatlas made of the "
+            f"mesh have room, got {width} × {height}"
+        )
+    inner, apart = packed
     uv = (inner * (size - 2 * rim) + rim) / size
-    if apart < min(2 * gutter, 2):
+    if charts.number > 1 and apart < min(2 * gutter, 2):
         warnings.warn(
             f"texels: {width} × {height} leave less than 2 between the {charts.number:,} charts "
             "that xatlas made of the mesh, so that bilinear look-ups mix them: give a higher "
@@ -67,20 +73,25 @@ def _cut(mesh: Mesh) -> _Charts:
     used = vertices[np.unique(np.asarray(mesh.faces))]
     middle, size = used.mean(axis=0), np.ptp(used, axis=0).max()
     vertices = (vertices - middle) / np.where(size > 0, size, 1)
+    normals = np.asarray(mesh.normals, np.float32)
+    # It makes no chart around one that is not finite, and takes the faces' own around zero.
+    normals = np.where(np.isfinite(normals).all(axis=1, keepdims=True), normals, 0)
     atlas = xatlas.Atlas()
     atlas.add_mesh(
         vertices.astype(np.float32),
         np.asarray(mesh.faces, np.uint32),
-        np.asarray(mesh.normals, np.float32),
+        normals,
     )
     atlas.generate(xatlas.ChartOptions(), xatlas.PackOptions(), False)
+    if not atlas.width * atlas.height:
+        raise ValueError("expected a mesh with an area, got none on any face")
     parent, faces, uv = atlas[0]
     flat = uv * np.array([atlas.width, atlas.height], np.float32)
     return _Charts(parent.astype(np.int64), faces, flat.astype(np.float32), atlas.chart_count)
 
 
-def _pack(charts: _Charts, size: int, gutter: int) -> tuple[Float[np.ndarray, "u 2"], int]:
-    """Pack charts into a square: their UV, and the texels that they stand apart.
+def _pack(charts: _Charts, size: int, gutter: int) -> tuple[Float[np.ndarray, "u 2"], int] | None:
+    """Pack charts into a square: their UV, and the texels that they stand apart; None without room.
 
     Two gutters apart where the charts then cover enough of the square, else closer.
     """
@@ -90,14 +101,8 @@ def _pack(charts: _Charts, size: int, gutter: int) -> tuple[Float[np.ndarray, "u
             if covered > most:
                 best, most = (uv, apart), covered
         if apart == 0 or most >= _COVERED:
-            break
+            return best
         apart //= 2
-    if best is None:
-        raise ValueError(
-            f"expected a resolution at which the {charts.number:,} charts that xatlas made of the "
-            f"mesh have room, got {size}"
-        )
-    return best
 
 
 def _packings(charts: _Charts, size: int, apart: int):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_finite, as_path, check_number, check_type
+from .._core.checks import as_finite, as_path, check_known, check_number, check_type
 from ..geometry import Texels
 from ._display import tone_map
 from ._write import write_image
@@ -61,6 +61,8 @@ def write_lightmap(
     """
     path = as_path(path)
     check_type("texels", texels, Texels)
+    check_known("texels", texels)
+    check_known("values", values)
     suffix = path.suffix.lower()
     if suffix not in (".exr", ".png"):
         raise ValueError(f"{path}: cannot write {suffix or 'no extension'}, only .exr and .png")
@@ -76,7 +78,8 @@ def write_lightmap(
                 f"{brightest.max():.3g}: give a lower exposure, or write .exr",
                 stacklevel=2,
             )
-        light = tone_map(light, exposure)
+        # An exposure may be beyond float16, and so may what it makes of a value.
+        light = tone_map(light.astype(np.promote_types(light.dtype, np.float32)), exposure)
     return write_image(path, texels.image(light))
 
 

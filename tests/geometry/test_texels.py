@@ -157,6 +157,11 @@ def test_a_normal_that_cancels_is_that_of_the_face():
         (square(scale=(2, 1)), {}, r"UV of the mesh within 0 to 1, .* got 0 to 2 and 0 to 1: unwr"),
         (square(scale=(0, 1)), {}, "UV of the mesh with an area, got none on any face"),
         (square(offset=(np.nan, 0)), {}, "UV of the mesh that are finite, got none"),
+        (
+            dataclasses.replace(square(), vertices=jnp.full((4, 3), jnp.nan, jnp.float32)),
+            {},
+            "the mesh has 4 NaN or infinite vertices",
+        ),
         (square(), {"resolution": 0}, "resolution must be an integer >= 1, got 0"),
         (square(), {"resolution": (4, 4, 4)}, "resolution as an integer or as width and height"),
         (square(), {"resolution": 40_000}, "resolution must be at most 32,768"),

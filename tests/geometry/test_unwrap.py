@@ -112,6 +112,21 @@ def test_charts_without_room_are_said(knot):
         geometry.texels(knot, 2)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_mesh_with_normals_that_are_none_or_without_area(knot):
+    expected = geometry.texels(square(), 16, unwrap=True)
+    for wrong in (np.nan, np.inf, 0):
+        mesh = dataclasses.replace(square(), normals=jnp.full((4, 3), wrong, jnp.float32))
+        held = geometry.texels(mesh, 16, unwrap=True)
+        np.testing.assert_array_equal(held.mesh.uv, expected.mesh.uv)
+        np.testing.assert_array_equal(held.normals, expected.normals)  # those of the faces
+    line = jnp.asarray([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]], jnp.float32)
+    with pytest.raises(ValueError, match="expected a mesh with an area, got none on any face"):
+        geometry.texels(dataclasses.replace(square(), vertices=line), 16, unwrap=True)
+    # A single chart has no other beside it that look-ups could mix.
+    assert geometry.texels(square(), 4, unwrap=True).num_points
+
+
 def test_textures_stay_with_the_uv_that_they_belong_to(knot):
     brick = BaseColor("brick", (0.5, 0.2, 0.1, 1.0), jnp.zeros((2, 2, 4), jnp.uint8))
     mesh = dataclasses.replace(

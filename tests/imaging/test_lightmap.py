@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import OpenImageIO as oiio
@@ -52,6 +53,11 @@ def test_a_png_is_what_a_screen_shows_and_says_what_it_cuts(tmp_path, texels, rn
     path = imaging.write_lightmap(tmp_path / "light.png", texels, light, exposure=0.5)
     codes = np.rint(255 * np.asarray(imaging.tone_map(jnp.asarray(light), 0.5)))
     np.testing.assert_array_equal(np.asarray(Image.open(path)), shown(texels, codes))
+    half = np.full(light.shape, 2**-17, np.float16)  # with an exposure beyond float16
+    path = imaging.write_lightmap(path, texels, half, exposure=2.0**17)
+    np.testing.assert_array_equal(
+        np.asarray(Image.open(path)), shown(texels, 255 * np.ones(light.shape))
+    )
     light[3, 1], light[5] = 2.5, -0.1
     with pytest.warns(
         UserWarning, match=r"1 of \d+ texels are cut off at 1, the brightest of 1.25"
@@ -71,4 +77,6 @@ def test_what_does_not_fit_is_refused(tmp_path, texels, unchecked):
         given = {"path": tmp_path / "a.exr", "values": light} | change
         with pytest.raises(ValueError, match=message):
             imaging.write_lightmap(given.pop("path"), texels, given.pop("values"), **given)
+    with pytest.raises(ValueError, match="expected known values for values, got traced ones"):
+        jax.eval_shape(lambda v: imaging.write_lightmap(tmp_path / "a.png", texels, v), light)
     assert list(tmp_path.iterdir()) == []

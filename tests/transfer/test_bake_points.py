@@ -327,6 +327,19 @@ def test_the_bits_are_those_of_the_points_alone():
         np.testing.assert_array_equal(baked(AROUND, **options).coefficients, expected)
 
 
+@pytest.mark.slow
+def test_a_device_takes_a_mesh_of_another_dtype():
+    """The coefficients are in that of the points, and but for rays at an edge the host's."""
+    ball, high = bodies.ball(), jnp.asarray([[0, 0, 1.5], [0, 1.5, 0]], jnp.float32)
+    fine = Mesh(ball.vertices.astype(float), ball.faces, ball.normals.astype(float))
+    host, device = (
+        baked(Points(high), scene=fine, bounces=2, device=where).coefficients
+        for where in (False, True)
+    )
+    assert device.dtype == host.dtype == jnp.float32
+    np.testing.assert_allclose(device, host, rtol=0, atol=2e-6)
+
+
 def test_points_that_see_nothing_are_counted_and_explained():
     ball = bodies.ball()
     some = jnp.asarray([[0, 0, 0], [0.3, 0, 0], [0, 0, 4]], jnp.float32)
@@ -362,6 +375,15 @@ def test_points_that_see_nothing_are_counted_and_explained():
         (
             {"surface": jax.tree.map(lambda x: x.astype(jnp.float16), AROUND), "scene": MESH},
             "expected positions of the points in float32 or float64, got float16",
+        ),
+        (
+            {
+                "surface": dataclasses.replace(
+                    texels_at_vertices(MESH), vertex=jnp.zeros(len(MESH.vertices), int)
+                ),
+                "albedo": np.ones(3),
+            },
+            r"shape \(3,\); that of the mesh given is albedo\[texels.vertex\]",
         ),
         (
             {"surface": texels_at_vertices(MESH), "scene": ray_scene(knot(400)), "bounces": 1},

@@ -99,7 +99,8 @@ def bake(
     Rays of texels start off the curved surface that the normals of their face's vertices tell of,
     where that lies above the face (Hanika 2021, "Hacking the shadow terminator"): from the flat
     face light from the side would be lost between the vertices of a coarse mesh. `Points` that lie
-    a little inside the mesh see nothing: give an `offset`.
+    a little inside the mesh see nothing: give an `offset`. Those without normals start their rays
+    where they are: exactly on a surface they see one side of it or nothing, by chance.
 
     Meshes may have any size and lie anywhere. What float32 rounds coordinates to is lost: give
     those of a map less their middle, or in float64.

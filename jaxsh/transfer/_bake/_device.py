@@ -187,6 +187,8 @@ class DeviceJob(Job):
         """Put what leaves the vertices after a pass on the device, once for all its rows."""
         with self._lock:
             if self._reflecting is None or self._reflecting[0] is not before:
-                outgoing = jnp.asarray(self._share.reshape(-1, 1)) * jnp.asarray(before)
+                # In the dtype of these rows, whatever that of the vertices is.
+                rows = jnp.asarray(before).astype(self.dtype)
+                outgoing = jnp.asarray(self._share.reshape(-1, 1)) * rows
                 self._reflecting = before, reflectors(self._vectors, self._surface, outgoing)
             return self._reflecting[1]

@@ -76,7 +76,8 @@ def checked(
     share = as_host_float(albedo, "albedo")
     if share.ndim and (mesh is None or share.shape != (len(mesh.vertices),)):
         most = "" if mesh is None else f" or have shape ({len(mesh.vertices)},)"
-        raise ValueError(f"albedo must be a number{most}, got shape {share.shape}")
+        hint = _of_given(surface, mesh, share)
+        raise ValueError(f"albedo must be a number{most}, got shape {share.shape}{hint}")
     check_finite("albedo", share, least=0.0, wait=True)
     occluder = None
     if mesh is not None and mesh is not surface:
@@ -97,6 +98,15 @@ def checked(
         occluder=occluder,
     )
     return Checked(arguments, mesh, cast)
+
+
+def _of_given(surface: Surface, mesh: Mesh | None, albedo: np.ndarray) -> str:
+    """Say how an albedo of the mesh that was unwrapped is taken to that of the texels."""
+    if not isinstance(surface, Texels) or mesh is not surface.mesh or albedo.ndim != 1:
+        return ""
+    least, most = int(np.asarray(surface.vertex).max()) + 1, len(surface.vertex)
+    given = least <= len(albedo) < most
+    return "; that of the mesh given is albedo[texels.vertex]" if given else ""
 
 
 def _in_the_way(surface: Surface, scene: RayScene | Mesh | None) -> Mesh | None:
