@@ -56,6 +56,24 @@ def test_a_sphere_far_away_sees_everything(sphere, distance):
         np.testing.assert_allclose(baked(mesh), unshadowed(mesh, DEGREE), rtol=0, atol=3e-7)
 
 
+def test_poles_that_stand_there_once_for_each_uv_hide_no_light():
+    """As exporters write a sphere: around a pole fans close in space alone."""
+    rows, columns = 12, 24
+    theta, phi = np.meshgrid(
+        np.linspace(np.pi, 0, rows + 1), np.linspace(0, 2 * np.pi, columns + 1), indexing="ij"
+    )
+    vertices = np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
+    ).reshape(-1, 3)
+    number = np.arange(len(vertices)).reshape(theta.shape)
+    a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
+    upper = np.stack([a, b, c], axis=-1)[1:].reshape(-1, 3)
+    lower = np.stack([a, c, d], axis=-1)[:-1].reshape(-1, 3)
+    mesh = bodies.by_hand(vertices, np.concatenate([upper, lower]), vertices)
+    # 1e-7 measured; a start within the surface sees nothing.
+    np.testing.assert_allclose(irradiance(mesh), 1, rtol=0, atol=3e-7)
+
+
 @pytest.mark.parametrize("scale", [1e-40, 1e-30, 1e-18, 1e18, 1e30])
 def test_a_sphere_of_any_size_sees_everything(sphere, scale):
     mesh = Mesh(sphere.vertices * np.float32(scale), sphere.faces, sphere.normals)

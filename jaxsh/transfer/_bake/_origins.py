@@ -49,7 +49,7 @@ def origins(
     Texels start off the curved surface that normals tell of, rather than off their flat faces. A
     bias of points and texels is a share of the `mesh` in their way.
     """
-    points, rim, size, inwards = _measured(surface, mesh)
+    points, rim, size, inwards = _measured(surface, normals, mesh)
     single = np.promote_types(points.dtype, np.float32)
     if not isinstance(surface, Mesh) and surface.normals is None:
         none = np.zeros(len(points))
@@ -99,13 +99,13 @@ class _Measured(NamedTuple):
     inwards: Callable[[Int[np.ndarray, " n"]], Float[np.ndarray, "n 3"]]  # unit vectors, or zero
 
 
-def _measured(surface: Surface, mesh: Mesh | None) -> _Measured:
+def _measured(surface: Surface, normals: Float[np.ndarray, "v 3"], mesh: Mesh | None) -> _Measured:
     """Measure a surface; of points alone no more is known than the `mesh` in their way."""
     if isinstance(surface, Mesh):
         points, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
         rim = _open(faces, len(points))
         size = _Size(_half(points), *_edges(points, faces))
-        return _Measured(points, rim, size, _inwards(points, faces, rim).of)
+        return _Measured(points, rim, size, _inwards(points, faces, rim, normals).of)
     points = np.asarray(surface.positions)
     half = _half(points if mesh is None else np.asarray(mesh.vertices))
     if isinstance(surface, Points):
@@ -246,12 +246,18 @@ def _inwards(
     vertices: Float[np.ndarray, "v 3"],
     faces: Int[np.ndarray, "f 3"],
     rim: Bool[np.ndarray, " v"],
+    normals: Float[np.ndarray, "v 3"],
 ) -> _Inwards:
-    """Point from vertices on a rim into their faces: the mean over the fan, at unit length."""
+    """Point from vertices on a rim into their faces, across the normal, at unit length.
+
+    It is the mean over the fan. Where a fan closes only in space, as around a pole that stands
+    there once for each UV, its mean is against the normal, and would take back what is moved along.
+    """
     parts = [faces[part] for part in _blocks(len(faces))]
     faces = np.concatenate([part[rim[part].any(axis=1)] for part in parts] or [faces])
     used, faces = np.unique(faces, return_inverse=True)
     faces, points, rim = faces.reshape(-1, 3), vertices[used].astype(np.float64), rim[used]
+    upwards = normals[used].astype(np.float64)
     total, angle = np.zeros((len(used), 3)), np.zeros(len(used))
     for corner in range(3):
         at = faces[:, corner]
@@ -263,6 +269,7 @@ def _inwards(
         for axis in range(3):
             total[:, axis] += np.bincount(at, middle[:, axis], minlength=len(used))
         angle += np.bincount(at, width, minlength=len(used))
+    total -= np.sum(total * upwards, axis=1, keepdims=True) * upwards
     # A fan that is nearly whole, as along a slit, has no inside.
     sided = rim & (np.linalg.norm(total, axis=1) > 0.05 * angle)
     return _Inwards(used, np.where(sided[:, None], _unit(total), 0))
