@@ -62,7 +62,7 @@ class Dataset:
     samples: int = 2
     """rays along each side of a pixel"""
     degree: int = 6
-    """of lights and transfer"""
+    """of lights and transfer; at most 6 with suns, whose sky is of no more"""
     directions: int = 256
     """of the bake"""
     bounces: int = 1
@@ -84,7 +84,11 @@ class Dataset:
             raise ValueError(f"ground must be between 0 and 1, got {self.ground}")
         if not 0 < self.fov_y < 180:
             raise ValueError(f"fov_y must be between 0 and 180 degrees, got {self.fov_y}")
-        if not self.elevations or max(map(abs, self.elevations)) > 89:
+        if self.suns and self.degree > 6:
+            raise ValueError(
+                f"degree must be at most 6 with suns, as their sky is, got {self.degree}"
+            )
+        if not self.elevations or not all(abs(e) <= 89 for e in self.elevations):
             raise ValueError(f"elevations must be between -89 and 89, got {self.elevations}")
 
 
@@ -101,6 +105,13 @@ class _Scene(NamedTuple):
 
 @experiment("dataset")
 def dataset(config: Dataset, context: Context) -> Table:
+    try:
+        return _dataset(config, context)
+    except OSError as error:  # no room, no permission, a file where a folder should be
+        raise UserError(f"{error}; what is whole stays, and the same command goes on") from error
+
+
+def _dataset(config: Dataset, context: Context) -> Table:
     folder = Path(config.folder) if config.folder else context.folder.with_suffix(".files")
     mesh = sources.mesh(context, config.mesh, config.up)
     environments = config.environments or tuple(context.data.environments())
@@ -160,13 +171,16 @@ def _about(
     """What decides every bit of the dataset, but for versions and machine."""
     settings = dataclasses.asdict(config) | {"environments": list(environments), "seed": seed}
     del settings["folder"]
+    settings["mesh"] = Path(config.mesh).name  # wherever it lies
     return {
         "what": "pictures of a mesh from many sides under many lights",
         "pictures": f"images/VIEW/LIGHT.{config.format}",
         "views": [f"views/VIEW/{name}" for name in _BUFFERS],
         "settings": settings,
-        "mesh": _digest(mesh),
-        "lights": _digest([(light.coefficients, light.sun) for light in chosen]),
+        "digests": {
+            "mesh": _digest(mesh),
+            "lights": _digest([(light.coefficients, light.sun) for light in chosen]),
+        },
     }
 
 

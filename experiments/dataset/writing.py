@@ -46,7 +46,9 @@ def claim(folder: Path, about: dict[str, Any]) -> None:
     """
     path = folder / ABOUT
     if not path.exists():
-        if folder.exists() and any(folder.iterdir()):
+        if folder.exists() and not folder.is_dir():
+            raise UserError(f"{str(folder)!r} is a file: choose another --folder")
+        if folder.exists() and any(".part" not in entry.name for entry in folder.iterdir()):
             raise UserError(f"{str(folder)!r} holds no dataset: move it or choose --folder")
         words(path, about)
         return
@@ -66,11 +68,15 @@ def claim(folder: Path, about: dict[str, Any]) -> None:
 
 
 def _flat(about: Any) -> dict[str, Any]:
-    """What is said, with the settings one by one."""
+    """What is said, with settings and digests one by one."""
     if not isinstance(about, dict):
         return {}
-    settings = about.get("settings")
-    return about | (settings if isinstance(settings, dict) else {}) | {"settings": None}
+    found = {key: value for key, value in about.items() if not isinstance(value, dict)}
+    for group, name in (("settings", "{}"), ("digests", "what {} holds")):
+        parts = about.get(group)
+        for key, value in (parts if isinstance(parts, dict) else {}).items():
+            found[name.format(key)] = value
+    return found
 
 
 class Writer:

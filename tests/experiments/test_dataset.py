@@ -55,7 +55,10 @@ def test_cameras_around():
 
 
 def test_folders(tmp_path):
-    folder, about = tmp_path / "new", {"settings": {"views": 2}, "mesh": "a"}
+    folder = tmp_path / "new"
+    about = {"settings": {"views": 2, "mesh": "a.glb"}, "digests": {"mesh": "a"}}
+    folder.mkdir()
+    (folder / "dataset.json.7.part").touch()  # of a run that was killed at its start
     writing.claim(folder, about)
     (folder / "images").mkdir()
     part = folder / "images" / "0000.7.part.png"
@@ -63,12 +66,26 @@ def test_folders(tmp_path):
     writing.claim(folder, about)
     assert not part.exists()
     before = (folder / writing.ABOUT).read_bytes()
-    with pytest.raises(UserError, match=r"other settings \(mesh\): choose --folder"):
-        writing.claim(folder, about | {"mesh": "b"})
+    with pytest.raises(UserError, match=r"other settings \(what mesh holds\): choose --folder"):
+        writing.claim(folder, about | {"digests": {"mesh": "b"}})
+    with pytest.raises(UserError, match=r"other settings \(views\): choose --folder"):
+        writing.claim(folder, about | {"settings": {"views": 3, "mesh": "a.glb"}})
     assert (folder / writing.ABOUT).read_bytes() == before
     (tmp_path / "file").touch()
     with pytest.raises(UserError, match="holds no dataset"):
         writing.claim(tmp_path, about)
+    with pytest.raises(UserError, match="is a file: choose another --folder"):
+        writing.claim(tmp_path / "file", about)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [({"elevations": (np.nan,)}, "elevations must be"), ({"degree": 7}, "at most 6 with suns")],
+)
+def test_settings_are_refused_before_a_bake(wrong, said):
+    with pytest.raises(ValueError, match=said):
+        dataset.Dataset(**wrong)
+    assert dataset.Dataset(degree=7, suns=0).degree == 7
 
 
 def test_a_picture_that_fails_is_told_and_leaves_nothing(tmp_path):
