@@ -1,5 +1,7 @@
 """The base color of a part of a surface."""
 
+from typing import Literal
+
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float, UInt8
@@ -11,7 +13,8 @@ class BaseColor(eqx.Module):
     `factor` is linear RGBA. `texture`, if any, is the picture as stored: 8-bit sRGB with linear
     alpha, shape (h, w, 4), its top row at v = 1. `double_sided` is what the file says of it.
     `unlit`: the base color is what the surface sends out already, under no other light
-    (KHR_materials_unlit of glTF).
+    (KHR_materials_unlit of glTF). `wrap`: what stands beyond [0, 1], "repeat", "clamp" or "mirror"
+    as in `imaging.sample_texture`; between the outermost texels and the edge too.
 
     **Example**
 
@@ -30,3 +33,4 @@ class BaseColor(eqx.Module):
     texture: UInt8[Array | np.ndarray, "h w 4"] | None = None
     double_sided: bool = eqx.field(static=True, default=False)
     unlit: bool = eqx.field(static=True, default=False)
+    wrap: Literal["repeat", "clamp", "mirror"] = eqx.field(static=True, default="repeat")

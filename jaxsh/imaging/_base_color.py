@@ -13,7 +13,7 @@ from .._core.xla import keep_rows
 from ..geometry import BaseColor, Mesh, Texels
 from ._display import srgb_decode
 from ._raster import Raster
-from ._texture import Pyramid, longer_step, pyramid, sample
+from ._texture import Pyramid, Wrap, longer_step, pyramid, sample
 
 
 def base_color(mesh: Mesh, at: Raster | Texels | None = None) -> Float[Array, "*shape 3"]:
@@ -21,8 +21,9 @@ def base_color(mesh: Mesh, at: Raster | Texels | None = None) -> Float[Array, "*
 
     The albedo of its surface, linear RGB, in the dtype of the vertices; alpha is left out, since
     surfaces are read as whole. Faces without a material count as white, and so do vertices without
-    a color. Textures are repeated beyond [0, 1], and filtered as `sample_texture` does with a
-    footprint: nothing finer than the places where it is wanted flickers.
+    a color. Textures go on beyond [0, 1] as `BaseColor.wrap` says, and are filtered as
+    `sample_texture` does with a footprint: nothing finer than the places where it is wanted
+    flickers.
 
     - `at`: where. None: at the vertices (v, 3), the mean over the faces around, each with the mean
       of its texture over an area as large as the face's cell. A `Raster` of this mesh: at each of
@@ -106,20 +107,35 @@ class _Surface(NamedTuple):
     factor: Float[Array, "m 3"]
     textures: Pyramid | None
     picture: Int[Array, " m"]  # which texture
+    wrap: tuple[Wrap | None, ...]  # None without a texture
 
 
 def _surface(mesh: Mesh) -> _Surface:
     dtype = mesh.vertices.dtype
     pictures: list[Array] = [jnp.ones((1, 1, 3), dtype)]
-    factors, chosen = [], []
+    factors, chosen, wraps = [], [], []
     for material in (*mesh.materials, BaseColor()):
         factors.append(jnp.stack([jnp.asarray(x, dtype) for x in material.factor[:3]]))
+        wraps.append(None if material.texture is None else material.wrap)
         chosen.append(0 if material.texture is None else len(pictures))
         if material.texture is not None:
             codes = jnp.asarray(material.texture)[..., :3]
             pictures.append(srgb_decode(codes.astype(dtype) / 255))
     textures = pyramid(pictures, levels=True) if len(pictures) > 1 else None
-    return _Surface(jnp.stack(factors), textures, jnp.asarray(chosen))
+    return _Surface(jnp.stack(factors), textures, jnp.asarray(chosen), tuple(wraps))
+
+
+def _looked_up(surface: _Surface, material: Int[Array, "*shape"], uv, squared):
+    """Look up the textures of materials, each as it goes on beyond [0, 1]."""
+    assert surface.textures is not None
+    picture = surface.picture[material]
+    wraps = sorted({one for one in surface.wrap if one})
+    found = sample(surface.textures, picture, uv, squared, wraps[0])
+    for wrap in wraps[1:]:
+        chosen = jnp.asarray([one == wrap for one in surface.wrap])[material]
+        other = sample(surface.textures, picture, uv, squared, wrap)
+        found = jnp.where(chosen[..., None], other, found)
+    return found
 
 
 def _material(mesh: Mesh, face: Int[Array, "*shape"]) -> Int[Array, "*shape"]:
@@ -178,7 +194,7 @@ def _colors(mesh: Mesh, face, barycentric, footprint):
         squared = None
         if footprint is not None:
             squared = longer_step(footprint, *_sizes(surface.textures, picture))
-        color = color * sample(surface.textures, picture, uv, squared, "repeat")
+        color = color * _looked_up(surface, material, uv, squared)
     if mesh.colors is not None:
         color = color * einsum("...kc,...k->...c", mesh.colors[at][..., :3], weights)
     return color
@@ -198,8 +214,8 @@ def _at_vertices(mesh: Mesh):
         # A vertex stands for a third of each face around it, about two faces in all.
         (a, b), (c, d) = jnp.moveaxis(uv[:, 1:] - uv[:, :1], 0, -1)  # edges
         squared = jnp.abs(a * d - b * c) * height * width
-        picture, squared = (jnp.broadcast_to(x[:, None], faces.shape) for x in (picture, squared))
-        color = color * sample(surface.textures, picture, uv, squared, "repeat")
+        each, squared = (jnp.broadcast_to(x[:, None], faces.shape) for x in (material, squared))
+        color = color * _looked_up(surface, each, uv, squared)
     total = jnp.zeros_like(mesh.vertices).at[faces].add(color)
     count = jnp.zeros_like(mesh.vertices[:, :1]).at[faces].add(1)
     mean = jnp.where(count > 0, total / jnp.maximum(count, 1), 1)

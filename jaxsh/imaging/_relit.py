@@ -110,7 +110,9 @@ def _with_picture(texels: Texels, shown: Float[np.ndarray, "v 3"]) -> Mesh:
     return dataclasses.replace(
         texels.mesh,
         colors=None,
-        materials=(BaseColor("relit", texture=codes, double_sided=double_sided, unlit=True),),
+        materials=(
+            BaseColor("relit", texture=codes, double_sided=double_sided, unlit=True, wrap="clamp"),
+        ),
         face_material=jnp.zeros(len(texels.mesh.faces), np.int32),
     )
 

@@ -163,9 +163,13 @@ def _tinted(
         number = -1
         if material.texture is not None:
             texture = np.asarray(material.texture)
-            known = [i for i, one in enumerate(pictures) if np.array_equal(one, texture)]
+            known = [
+                i
+                for i, (one, wrap) in enumerate(pictures)
+                if wrap == material.wrap and np.array_equal(one, texture)
+            ]
             number = known[0] if known else len(pictures)
-            pictures += [] if known else [texture]
+            pictures += [] if known else [(texture, material.wrap)]
         at = np.flatnonzero(rows[order] == row)
         groups.append(
             {
@@ -180,9 +184,9 @@ def _tinted(
         raise ValueError("expected UV of a mesh whose materials have textures, got none")
     if pictures:
         arrays["uv"] = np.nan_to_num(np.asarray(mesh.uv)).astype("<f4")
-    for i, picture in enumerate(pictures):
+    for i, (picture, wrap) in enumerate(pictures):
         arrays[f"texture{i}"] = np.frombuffer(_png(picture), np.uint8)
-        textures.append({"array": f"texture{i}"})
+        textures.append({"array": f"texture{i}", "wrap": wrap})
     facts = _facts(groups, tinted=True, colored=mesh.colors is not None, textures=textures)
     return faces[order], facts, arrays
 

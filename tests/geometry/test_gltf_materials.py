@@ -224,7 +224,15 @@ def test_what_the_base_color_does_not_hold_is_said():
     gltf.json["textures"][0]["sampler"] = gltf.entry("samplers", wrapS=33071)
     attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"]
     attributes["TEXCOORD_0"] = gltf.add(np.float32(2 * UV))
-    assert "clamped or mirrored" in said(gltf)
+    assert "goes on otherwise along u than v, read as repeated" in said(gltf)
+    for wrap, code in (("clamp", 33071), ("mirror", 33648)):
+        gltf = textured(encoded())
+        gltf.json["textures"][0]["sampler"] = gltf.entry("samplers", wrapS=code, wrapT=code)
+        attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"]
+        attributes["TEXCOORD_0"] = gltf.add(np.float32(2 * UV))
+        polygons = read(gltf)
+        assert polygons.found == ()
+        assert polygons.materials[0].wrap == wrap
     gltf = textured(encoded(), normalTexture={"index": 0})
     (material,) = gltf.json["materials"]
     material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {"index": 0}

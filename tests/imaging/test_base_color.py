@@ -146,6 +146,21 @@ def test_a_lightmap_is_drawn_as_its_texels_are(raster):
     np.testing.assert_allclose(drawn, interpolate(raster, light, 0.25), rtol=0, atol=1e-14)
 
 
+def test_textures_go_on_as_their_materials_say(raster):
+    texture = srgb_decode(jnp.asarray(CODES[..., :3] / 255))
+    clamped, mirrored = (BaseColor(texture=CODES, wrap=wrap) for wrap in ("clamp", "mirror"))
+    mesh = sheet(face_material=jnp.array([2, 0]), materials=(clamped, BaseColor(), mirrored))
+    seen = np.asarray(base_color(mesh, raster))
+    uv, mirror = np.asarray(raster.uv), np.asarray(raster.face) == 0
+    for here in (mirror, np.asarray(raster.face) == 1):
+        assert ((uv[here] < 0) | (uv[here] > 1)).any()
+    # A picture turned over shows its outermost texel twice, as a clamped one does.
+    folded = np.where(mirror[..., None], 1 - abs(1 - uv % 2), uv)
+    expected = sample_texture(texture, jnp.asarray(folded), raster.footprint, wrap="clamp")
+    on_sheet = np.asarray(raster.face) >= 0
+    np.testing.assert_allclose(seen[on_sheet], expected[on_sheet], rtol=0, atol=1e-12)
+
+
 def test_a_mesh_without_colors_is_white(raster):
     np.testing.assert_array_equal(base_color(sheet()), 1)
     seen = np.asarray(raster.face)[..., None] >= 0

@@ -157,6 +157,7 @@ def test_texels_become_a_texture_that_lies_where_they_do(tmp_path, rng):
     np.testing.assert_allclose(picture[0, 0], screen(mean, 1.0), rtol=0, atol=0.51)
     (read,) = geometry.read_mesh(path).materials
     np.testing.assert_array_equal(read.texture[..., :3], picture)
+    assert read.wrap == "clamp"  # an edge shows nothing of the one across
     (part,) = trimesh.load(path, process=False).geometry.values()
     np.testing.assert_array_equal(part.visual.material.baseColorTexture, picture)
     for name, more in (("a.ply", {}), ("a.glb", {"textured": True})):

@@ -75,7 +75,7 @@ def textured(rows: int = 24, columns: int = 48) -> geometry.Mesh:
 
     materials = (
         geometry.BaseColor("belt", (0.9, 0.8, 0.7, 1.0), texture(4, 8)),
-        geometry.BaseColor("cap", (0.5, 0.9, 0.6, 1.0), texture(3, 5)),
+        geometry.BaseColor("cap", (0.5, 0.9, 0.6, 1.0), texture(3, 5), wrap="clamp"),
     )
     colors = np.stack([0.6 + 0.4 * u.ravel(), 0.5 + 0.5 * v.ravel(), 1 - 0.5 * v.ravel()], axis=1)
     colors = np.concatenate([colors, np.ones((len(colors), 1))], axis=1)

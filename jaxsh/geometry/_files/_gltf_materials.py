@@ -12,6 +12,7 @@ from ..._core.json_fields import Fields, extension, flag, inner, numbers, text, 
 from .._base_color import BaseColor
 from ._gltf_pictures import Pictures
 
+WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 _REPEAT = 10497
 
 
@@ -25,7 +26,7 @@ class _Surface(NamedTuple):
     has_texture: bool = False
     uv_set: int = 0
     uv_matrix: Float[np.ndarray, "2 3"] | None = None
-    repeats: bool = True
+    known: bool = True  # whether the sampler's way beyond [0, 1] is that of `color`
 
 
 class Materials:
@@ -68,9 +69,9 @@ class Materials:
         surface = self._surfaces[row] if row >= 0 else _Surface(BaseColor())
         if surface.uv_matrix is not None:
             uv = uv @ surface.uv_matrix[:, :2].T + surface.uv_matrix[:, 2]
-        if not surface.repeats and ((uv < 0) | (uv > 1)).any():
+        if not surface.known and ((uv < 0) | (uv > 1)).any():
             self._document.note(
-                "primitives leave a texture that is clamped or mirrored, read as repeated"
+                "primitives leave a texture that goes on otherwise along u than v, read as repeated"
             )
         return np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1)
 
@@ -109,12 +110,13 @@ class Materials:
         if transform is not None:
             uv_set = whole(transform, "texCoord", owner, uv_set)
             matrix = _uv_matrix(transform, f"KHR_texture_transform of {owner}")
-        repeats = True
+        known = True
         if fields.get("sampler") is not None:
             sampler = self._document.item("samplers", whole(fields, "sampler", name), name)
             wraps = [whole(sampler, key, name, _REPEAT) for key in ("wrapS", "wrapT")]
-            repeats = wraps == [_REPEAT, _REPEAT]
-        return _Surface(color, True, uv_set, matrix, repeats)
+            known = wraps[0] == wraps[1] and wraps[0] in WRAPS
+            color = dataclasses.replace(color, wrap=WRAPS[wraps[0] if known else _REPEAT])
+        return _Surface(color, True, uv_set, matrix, known)
 
 
 def _other_maps(fields: Fields, owner: str) -> list[str]:

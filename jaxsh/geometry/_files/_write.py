@@ -24,7 +24,12 @@ class _Format(NamedTuple):
 
 
 _POSITIONS_ONLY = ("hard edges", "uv", "colors", "materials")
-_NOT_IN_OBJ = ("alpha of colors", "double-sided materials", "unlit materials")
+_NOT_IN_OBJ = (
+    "alpha of colors",
+    "double-sided materials",
+    "unlit materials",
+    "textures that do not repeat",
+)
 _FORMATS = {
     ".ply": _Format(ply_files, leaves_out=("materials",)),
     ".obj": _Format(obj_files, leaves_out=_NOT_IN_OBJ),

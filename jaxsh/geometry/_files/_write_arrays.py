@@ -106,6 +106,8 @@ def has(arrays: Arrays, what: str) -> bool:
             return any(one.double_sided for one in arrays.materials)
         case "unlit materials":
             return any(one.unlit for one in arrays.materials)
+        case "textures that do not repeat":
+            return any(one.texture is not None and one.wrap != "repeat" for one in arrays.materials)
         case "hard edges":
             return len(np.unique(arrays.vertices, axis=0)) < len(arrays.vertices)
         case "materials":

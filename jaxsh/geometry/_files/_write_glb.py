@@ -7,6 +7,7 @@ import numpy as np
 
 from ..._core.gltf import glb
 from .._base_color import BaseColor
+from ._gltf_materials import WRAPS
 from ._pictures import png
 from ._write_arrays import Arrays
 
@@ -111,7 +112,8 @@ def _materials(materials: tuple[BaseColor, ...], buffer: _Buffer) -> dict[str, A
 
     Alpha is kept, but nothing says that it cuts out or blends: a `BaseColor` does not.
     """
-    described, images = [], []
+    described, images, wraps = [], [], []
+    codes = {name: code for code, name in WRAPS.items()}
     for material in materials:
         # Nothing here is metal, which glTF takes a material for that does not say so.
         factor = [float(one) for one in material.factor]
@@ -120,6 +122,7 @@ def _materials(materials: tuple[BaseColor, ...], buffer: _Buffer) -> dict[str, A
             surface["baseColorTexture"] = {"index": len(images)}
             view = buffer.view(png(np.asarray(material.texture)))
             images.append({"bufferView": view, "mimeType": "image/png"})
+            wraps.append(codes[material.wrap])
         one: dict[str, Any] = {"name": material.name, "pbrMetallicRoughness": surface}
         if material.double_sided:
             one["doubleSided"] = True
@@ -133,5 +136,9 @@ def _materials(materials: tuple[BaseColor, ...], buffer: _Buffer) -> dict[str, A
         parts["materials"] = described
     if images:
         parts["images"] = images
-        parts["textures"] = [{"source": i} for i in range(len(images))]
+        known = sorted(set(wraps))
+        parts["samplers"] = [{"wrapS": wrap, "wrapT": wrap} for wrap in known]
+        parts["textures"] = [
+            {"source": i, "sampler": known.index(wrap)} for i, wrap in enumerate(wraps)
+        ]
     return parts

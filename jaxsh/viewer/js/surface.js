@@ -97,7 +97,7 @@ export class Surface {
   constructor(gl, scene) {
     Object.assign(this, { gl, scene });
     const { surface } = scene;
-    this.textures = surface.textures.map((_, i) => this.#picture(scene.pictures[i]));
+    this.textures = surface.textures.map(({ wrap }, i) => this.#picture(scene.pictures[i], wrap));
     if (surface.textures.length) this.white = this.#picture(new Uint8Array([255, 255, 255, 255]));
     this.uv = this.#buffer(scene.uv);
     this.colors = this.#buffer(scene.colorCodes);
@@ -160,7 +160,7 @@ export class Surface {
   }
 
   // A texture of sRGB codes, which is looked up and halved in linear light.
-  #picture(image) {
+  #picture(image, wrap = "repeat") {
     const { gl } = this;
     gl.activeTexture(gl.TEXTURE0 + UNITS.picture);
     const texture = gl.createTexture();
@@ -170,6 +170,8 @@ export class Surface {
     else gl.texImage2D(gl.TEXTURE_2D, 0, ...form, image);
     gl.generateMipmap(gl.TEXTURE_2D);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    const beyond = { repeat: gl.REPEAT, clamp: gl.CLAMP_TO_EDGE, mirror: gl.MIRRORED_REPEAT }[wrap];
+    for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, side, beyond);
     return texture;
   }
 
