@@ -113,7 +113,8 @@ class _Surface(NamedTuple):
 def _surface(mesh: Mesh) -> _Surface:
     dtype = mesh.vertices.dtype
     pictures: list[Array] = [jnp.ones((1, 1, 3), dtype)]
-    factors, chosen, wraps = [], [], []
+    factors, chosen = [], []
+    wraps: list[Wrap | None] = []
     for material in (*mesh.materials, BaseColor()):
         factors.append(jnp.stack([jnp.asarray(x, dtype) for x in material.factor[:3]]))
         wraps.append(None if material.texture is None else material.wrap)
@@ -129,7 +130,7 @@ def _looked_up(surface: _Surface, material: Int[Array, "*shape"], uv, squared):
     """Look up the textures of materials, each as it goes on beyond [0, 1]."""
     assert surface.textures is not None
     picture = surface.picture[material]
-    wraps = sorted({one for one in surface.wrap if one})
+    wraps: list[Wrap] = sorted({one for one in surface.wrap if one})
     found = sample(surface.textures, picture, uv, squared, wraps[0])
     for wrap in wraps[1:]:
         chosen = jnp.asarray([one == wrap for one in surface.wrap])[material]
