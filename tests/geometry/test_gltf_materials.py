@@ -225,6 +225,10 @@ def test_what_the_base_color_does_not_hold_is_said():
     attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"]
     attributes["TEXCOORD_0"] = gltf.add(np.float32(2 * UV))
     assert "goes on otherwise along u than v, read as repeated" in said(gltf)
+    gltf = textured(encoded())
+    attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"]
+    attributes["TEXCOORD_0"] = gltf.add(np.where(UV.max() == UV, np.nan, UV).astype(np.float32))
+    assert "texture coordinates are NaN or infinite, read as 0" in said(gltf)
     for wrap, code in (("clamp", 33071), ("mirror", 33648)):
         gltf = textured(encoded())
         gltf.json["textures"][0]["sampler"] = gltf.entry("samplers", wrapS=code, wrapT=code)

@@ -69,6 +69,8 @@ class Materials:
         surface = self._surfaces[row] if row >= 0 else _Surface(BaseColor())
         if surface.uv_matrix is not None:
             uv = uv @ surface.uv_matrix[:, :2].T + surface.uv_matrix[:, 2]
+        bad = int((~np.isfinite(uv)).any(axis=1).sum())
+        self._document.note("texture coordinates are NaN or infinite, read as 0", bad)
         if not surface.known and ((uv < 0) | (uv > 1)).any():
             self._document.note(
                 "primitives leave a texture that goes on otherwise along u than v, read as repeated"
