@@ -41,6 +41,7 @@ def errors(folder):
     return {(row["variant"], row["degree"]): row for row in rows if "variant" in row}
 
 
+@pytest.mark.slow
 def test_error_falls_with_degree(errors):
     assert len(errors) == 6
     for variant in ("unshadowed", "shadowed", "one bounce"):
@@ -50,6 +51,7 @@ def test_error_falls_with_degree(errors):
         assert errors[variant, 4]["reference_error"] < 2
 
 
+@pytest.mark.slow
 def test_what_a_variant_leaves_out_is_in_its_error(errors):
     unshadowed, shadowed, bounced = (
         errors[variant, 4] for variant in ("unshadowed", "shadowed", "one bounce")
@@ -59,6 +61,7 @@ def test_what_a_variant_leaves_out_is_in_its_error(errors):
     assert bounced["error"] == bounced["error_to_one_bounce"] < shadowed["error_to_one_bounce"]
 
 
+@pytest.mark.slow
 def test_suns_that_are_split_off_do_not_ring(errors):
     for variant in ("unshadowed", "shadowed", "one bounce"):
         row = errors[variant, 4]

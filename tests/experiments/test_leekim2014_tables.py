@@ -71,6 +71,7 @@ class TestScene:
         largest = np.asarray(scene.full()).max(axis=1)[np.asarray(scene.facing)]
         assert np.percentile(largest, 99) == pytest.approx(1, abs=1e-4)
 
+    @pytest.mark.slow
     def test_a_cut_scene_has_the_leading_coefficients(self, scene):
         lower = scene.cut(2)
         assert lower.row.degree == lower.baked.degree == 2

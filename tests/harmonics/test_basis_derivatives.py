@@ -169,6 +169,7 @@ def test_third_derivative_at_the_pole():
         assert np.abs(expected).max() > 1
 
 
+@pytest.mark.slow
 def test_gradients_through_a_nonlinear_loss():
     @jax.jit
     def loss(s):

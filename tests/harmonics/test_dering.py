@@ -157,6 +157,7 @@ def test_dering_of_irradiance_by_hand():
     np.testing.assert_array_equal(clean[1], c[1])
 
 
+@pytest.mark.slow
 def test_dering_of_irradiance_derivatives(rng):
     """Through the convolution, forward and reverse."""
     (source,) = oracles.unit_vectors(rng, 1)
@@ -264,6 +265,7 @@ def test_dering_cannot_help_a_mean_that_is_not_positive(mean, rng):
 
 
 @pytest.mark.parametrize("scale", [1e-20, pytest.param(1e20, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_dering_does_not_depend_on_the_unit(scale, rng):
     c = lights(rng, 6).astype(np.float32)
     _, strength = dering(c)

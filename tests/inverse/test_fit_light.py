@@ -83,6 +83,7 @@ def dense(normals, albedo, weights, observed, noise):
     return light, spread
 
 
+@pytest.mark.slow
 def test_posterior(seen):
     normals, albedo, weights, light, observed = seen
     found = fits(None)(observed, normals, albedo, weights)

@@ -110,6 +110,7 @@ def test_float32_under_x64_with_the_pose_kept(baked):
     np.testing.assert_allclose(kept.size, LAMP.size * jnp.array([2.0, 1.0]), rtol=1e-15)
 
 
+@pytest.mark.slow
 def test_colors_are_those_of_the_lights(baked, rng):
     lights = LAMP.polygon, PANEL.polygon
     truth = np.stack([LAMP.radiance, PANEL.radiance])

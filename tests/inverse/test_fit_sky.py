@@ -84,6 +84,7 @@ def test_noise_does_what_the_confidence_says(baked, fit, rng):
 
 
 @pytest.mark.parametrize("model", [glow, pytest.param(None, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_the_solver_s_residual_is_that_of_shade_diffuse(model, baked, rng):
     """The few rows that the fit works on hold all V of them, with weights and colored albedo."""
     sun, exposure = direction(30, 20), 0.02

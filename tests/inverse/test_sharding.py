@@ -95,6 +95,7 @@ def seen(lit, lights):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.slow
 def test_colors(kind, lit):
     lights = lamp(-1.0, [2.0, 1.0, 0.0]), lamp(0.6, [0.5, 1.0, 3.0])
 

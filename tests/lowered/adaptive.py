@@ -58,6 +58,7 @@ def tile_set(made, tiling, directions, rows):
         positions=positions,
         normals=normals,
         diffuse=adaptive._staged.diffuse_part(made, None, True),
+        group=V,
     )
 
 

@@ -104,6 +104,7 @@ def test_blockers_that_share_an_edge_leave_no_gap():
         np.testing.assert_allclose(light, 0, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_blocker_behind_the_light_or_the_point_does_not_block():
     polygon, whole = Polygon(WINDOW, ONE), quadrature(WINDOW)[0]
     slanted = np.array([[-0.3, 0.2, 1.0], [0.3, 0.2, 1.0], [0.3, 0.4, 4.0], [-0.3, 0.4, 4.0]])

@@ -131,6 +131,7 @@ def test_one_light_that_nothing_hides(resolution, limit):
     assert relative(edge, slope) < limit
 
 
+@pytest.mark.slow
 def test_edges_jit_vmap_and_float32(rng):
     cube = random_cube(rng, resolution=2, batch=(2,))
     gradient = edges(cube, 2)

@@ -79,6 +79,7 @@ def check_near(degree, count, rng):
         np.testing.assert_allclose(exact[:, 0, :4], known, rtol=0, atol=3e-11)
 
 
+@pytest.mark.slow
 def test_near_receivers_in_float32(rng):
     check_near(1, 1800, rng)
 

@@ -143,15 +143,24 @@ def test_polygon_where_there_is_no_light_to_speak_of():
         np.testing.assert_array_equal(array, 0)
 
 
-def test_polygon_is_differentiable_both_ways(rng):
-    """In point and vertices: forward, reverse, the analytic gradient, and differences."""
+def lit_concave(rng):
     vertices = concave(rng)
     point = jnp.asarray(before(vertices, rng, 0.8))
     polygon = Polygon(vertices, RADIANCE)
     _, gradient = polygon_harmonics_with_gradient(polygon, point, 3)
+    return vertices, polygon, point, gradient
+
+
+def test_polygon_s_gradient_is_its_derivative(rng):
+    _, polygon, point, gradient = lit_concave(rng)
     forward = jax.jit(jax.jacfwd(lambda p: polygon_harmonics(polygon, p, 3)))(point)
     np.testing.assert_allclose(forward, gradient, rtol=0, atol=1e-13)
 
+
+@pytest.mark.slow
+def test_polygon_is_differentiable_both_ways(rng):
+    """In point and vertices: reverse, the analytic gradient, differences, second derivatives."""
+    vertices, polygon, point, gradient = lit_concave(rng)
     probe = jnp.asarray(rng.normal(size=(3, 16)))
     corners = jnp.asarray(vertices)
     in_plane = jnp.asarray(rng.normal(size=(5, 2)) @ (vertices[2:4] - vertices[1]))

@@ -47,6 +47,7 @@ def test_a_polygon_light_s_value_and_reverse_mode(points):
     check_sharded(light, (points,), (ROWS,), ROWS)
 
 
+@pytest.mark.slow
 def test_sphere_lights(points):
     ball = midrange.Sphere(np.array([0, 0, 2.0]), np.array(0.5), np.ones(3))
 

@@ -46,6 +46,7 @@ def test_between_the_samples(fitted, rng):
     assert fitted.solution.residual < 1e-7
 
 
+@pytest.mark.slow
 def test_edges_of_the_range(fitted):
     for elevation in (90, 0):
         for haze in (1.0, 3.0):

@@ -127,6 +127,7 @@ def glow(view, sun, haze):
 @pytest.mark.parametrize(
     "kind", [AxisType.Auto, pytest.param(AxisType.Explicit, marks=pytest.mark.slow)]
 )
+@pytest.mark.slow
 def test_fits_share_their_samples_out(solver, kind):
     """35 samples, so that one fills up, and two rounds of Lawson's."""
     options = {"degree": 1, "terms": (4, 2), "samples": (7, 5), "solver": solver, "lawson": 1}

@@ -63,6 +63,7 @@ def test_a_model_meets_a_sun_of_unit_length():
 
 
 @pytest.mark.parametrize("degree", [6, pytest.param(32, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_twice_the_nodes_change_nothing(degree):
     suns, turbidities = (a.ravel() for a in np.meshgrid(ELEVATIONS, TURBIDITIES))
     model = functools.partial(sky.preetham_radiance, check="allow")

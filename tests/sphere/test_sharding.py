@@ -54,6 +54,7 @@ def test_samples_of_many_functions(rng):
     check_sharded(project, arguments, (ROWS, WHOLE, WHOLE), ROWS)
 
 
+@pytest.mark.slow
 def test_gradient_of_project(rng):
     def pulled(values, directions, weights, pull):
         def loss(*samples):

@@ -214,6 +214,7 @@ def test_a_scene_may_hold_more_than_the_mesh():
     assert abs(under[top, 0]) * np.sqrt(4 * np.pi) < 1e-3
 
 
+@pytest.mark.slow
 def test_bounces_off_another_mesh_than_the_scenes_first_are_refused():
     mesh = knot(300)
     ground = bodies.rectangle((-2.0, -2.0, -2.0), (4.0, 0.0, 0.0), (0.0, 4.0, 0.0))

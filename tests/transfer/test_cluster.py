@@ -101,6 +101,7 @@ def test_vertices_without_light_are_counted_as_by_bake(tmp_path, client):
     np.testing.assert_array_equal(rows(tmp_path / "two"), expected.coefficients)
 
 
+@pytest.mark.slow
 def test_another_bake_s_store_is_refused(tmp_path, client):
     path = tmp_path / "knot"
     bake_on(client, MESH, DEGREE, store=path, **ALIKE)

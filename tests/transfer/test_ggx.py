@@ -190,6 +190,7 @@ def test_derivatives_of_what_is_seen(rng):
     assert all(np.abs(slope).max() > 0 for slope in slopes)
 
 
+@pytest.mark.slow
 def test_no_surface_adds_light():
     """Of uniform light at most all is reflected, at any roughness, and none seen from behind."""
     cosines = np.concatenate([np.linspace(0, 0.2, 9), np.linspace(0.3, 1, 8), [-0.05, -0.4, -1]])
