@@ -102,11 +102,13 @@ assert sky.preetham_harmonics(jnp.array([0.0, 0.6, 0.8]), 3.0).shape[0] == 3
 """
 
 
+@pytest.mark.slow  # also: make test-minimal
 def test_the_basis_and_a_bake_run_without_optional_packages():
     code = BLOCK.format(optional=set(OPTIONAL)) + BASIS
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("package", "statement"),
     [

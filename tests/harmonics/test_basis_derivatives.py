@@ -84,6 +84,7 @@ def test_gradient_energy_of_each_band(rng):
     np.testing.assert_allclose(energy, np.broadcast_to(expected, energy.shape), 1e-12)  # 1e-13
 
 
+@pytest.mark.slow
 def test_gradient_in_float32(rng):
     s = rng.normal(size=(40, 3)).astype(np.float32)
     _, gradient = harmonics.evaluate_with_gradient(s, 30)

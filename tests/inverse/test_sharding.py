@@ -50,6 +50,7 @@ def glow(sun, turbidity):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.slow
 def test_sky(kind, lit, rng):
     sun = jnp.array([0.6, 0.0, 0.8])
     observed = transfer.shade_diffuse(glow(sun, 3.0), lit, 0.5)

@@ -91,6 +91,7 @@ def test_solid_angles_are_exact():
     np.testing.assert_allclose(cube.solid_angles, np.tile(expected, 6), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_inside_a_closed_light_only_the_mean_is_left():
     """The furnace: radiance from all sides, so no band but l = 0 and no gradient, by both forms."""
     inwards = EmissiveMesh(BOX, WHITE, two_sided=True)

@@ -48,6 +48,7 @@ def test_equals_the_paper_s_loop(rng, dtype, rtol):
     )
 
 
+@pytest.mark.slow
 def test_is_linear_in_the_radiance(rng):
     cube = random_cube(rng, resolution=1)
 

@@ -207,6 +207,7 @@ def scaled_lights(scale, points):
     return polygon_harmonics_with_gradient(light, scaled, 1, horizon=up, blockers=[blocker])
 
 
+@pytest.mark.slow
 def test_any_unit_of_length(rng):
     """Powers of two about 1e-18 and 1e18 change no bit; the lights' squared areas would not fit."""
     points = (0.3 * rng.normal(size=(20, 3))).astype(np.float32)

@@ -55,6 +55,7 @@ def test_polygon_is_its_surface_integral(rng, degree):
         np.testing.assert_allclose(gradient[i], slope, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_polygon_up_to_the_whole_half_space():
     """Arcs of almost π: a square from 1e-3 of its size fills almost a half space."""
     degree = 20

@@ -73,6 +73,7 @@ def test_what_is_hidden_is_what_segments_meet(rng, grid, cubes, dense):
     np.testing.assert_allclose(found.values[whole], kept[whole], rtol=0, atol=0.5)
 
 
+@pytest.mark.slow
 def test_where_all_see_weights_stay(rng, grid):
     """Negative ones too, outside the grid."""
     cubes = midrange.capture(midrange.Scene([LAMP]), grid.points, 4)

@@ -64,6 +64,7 @@ def test_plain_series_too(rng):
     assert np.isfinite(at_zenith).all()
 
 
+@pytest.mark.slow
 def test_solvers_agree(rng):
     design = rng.normal(size=(40, 5))
     targets, scales = rng.normal(size=(3, 40)), rng.uniform(0.5, 1, size=(3, 40))
@@ -176,6 +177,7 @@ def test_rotation_to_the_suns_azimuth(fitted):
     assert (np.asarray(at_zero)[:, m < 0] == 0).all()
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_the_projection(fitted):
     """At the zenith and beside it too, forward and reverse."""
     suns = jnp.asarray([(0, 0, 1.0), (1e-3, -1e-3, 1), (0.3, 0.4, 0.5), (1, 0, 0.01)])

@@ -42,6 +42,7 @@ def test_cie_by_hand(rng):
         assert np.all(sky.cie_radiance(-view, sun, kind=kind) == 0)
 
 
+@pytest.mark.slow
 def test_cie_is_a_model():
     model = functools.partial(sky.cie_radiance, kind=12)
     sun = sun_at(np.array([60.0, 5.0]))
@@ -82,6 +83,7 @@ def test_ground_under_an_even_sky():
     np.testing.assert_allclose(whole, expected, 0, 1e-13)
 
 
+@pytest.mark.slow
 def test_irradiance_is_exact_at_every_degree():
     """Against the integral of radiance · cos θ, the sun's disc and the sky together."""
     sun = sun_at(30.0, 70.0)
@@ -112,6 +114,7 @@ def test_ground_against_projection():
     np.testing.assert_allclose(down, math.pi * radiance[:, 0], 1e-13)
 
 
+@pytest.mark.slow
 def test_ground_broadcasts_and_differentiates():
     light = sky.project_preetham(sun_at(np.array([20.0, 50.0])), 3.0, 2)
     many = sky.with_ground(light, np.array([[[0.1]], [[0.2]], [[0.3]]]))

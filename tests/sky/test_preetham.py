@@ -152,6 +152,7 @@ POINTS = {
 
 
 @pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_derivatives_are_finite_everywhere(dtype):
     view, sun = (jnp.asarray(v, dtype) for v in map(np.stack, zip(*POINTS.values(), strict=True)))
     turbidity = jnp.asarray(2.0, dtype)

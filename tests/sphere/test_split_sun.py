@@ -56,6 +56,7 @@ def test_a_disc_is_found_wherever_it_is(sun, dtype):
     )
 
 
+@pytest.mark.slow
 def test_the_rays_are_the_disc():
     """Coefficients of the picture are those of the rest and of the suns."""
     image = picture((0.48, 0.6, 0.64))

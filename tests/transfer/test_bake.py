@@ -94,6 +94,7 @@ def test_equals_the_slow_twin(directions, tolerance):
     assert relative(got, twin) < tolerance
 
 
+@pytest.mark.slow
 def test_few_rays_go_far():
     mesh = knot(600)
     reference = baked(mesh, 6, directions=4096, seed=1)

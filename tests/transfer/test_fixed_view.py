@@ -57,6 +57,7 @@ def test_a_channel_that_is_no_number_stays_apart(rng):
     np.testing.assert_array_equal(product(broken)[:, [0, 2]], product(light)[:, [0, 2]])
 
 
+@pytest.mark.slow
 def test_fixed_views_differentiate_as_glossy_shading(rng):
     """In light, transfer, eye and material, forward and reverse, by one program."""
     made, material = surface(rng), materials(rng, "colors", V)

@@ -40,6 +40,7 @@ def per_vertex(rng, *shape):
     return rng.uniform(0.1, 1, size=shape).astype(np.float32)
 
 
+@pytest.mark.slow
 def test_what_fills_up_sees_nothing(made):
     shared = made.sharded(DEVICES)
     assert (shared.num_points, made.num_points) == (W, V)
