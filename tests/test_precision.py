@@ -19,7 +19,7 @@ CHOSEN = jax.lax.Precision.HIGH
 SHADING = {
     "adaptive": {"AnchorSet.__call__", "TileSet.__call__", "shade"},
     "midrange": {"shade"},
-    "transfer": {"FixedView.__call__", "shade_diffuse", "shade_glossy"},
+    "transfer": {"FixedView.__call__", "fluence", "shade_diffuse", "shade_glossy"},
 }
 # What multiplies on the way, but looks at values and so cannot be traced: called instead.
 CALLED = {

@@ -65,7 +65,7 @@ def moving(context: Context, scene: Scene, frames: int, views: int, step: float)
     first = prepared(path[0])
     parts = (getattr(first, field.name) for field in dataclasses.fields(first))
     own = [part for part in parts if part is not first.diffuse]  # which all sets share
-    size = sum(leaf.nbytes for leaf in jax.tree.leaves(own))
+    size = sum(leaf.nbytes for leaf in jax.tree.leaves(own) if isinstance(leaf, jax.Array))
     return row | {
         "moving_gain": mid["full"] / mid["prepared"],
         "moving_gain_mean": mean["full"] / mean["prepared"],
