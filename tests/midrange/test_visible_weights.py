@@ -62,15 +62,20 @@ def test_what_is_hidden_is_what_segments_meet(rng, grid, cubes, dense):
     if not dense:
         np.testing.assert_array_equal(found.indices, weights.indices)
         hidden = np.take_along_axis(hidden, np.asarray(weights.indices), axis=1)
-    # Where the direction passes the box's silhouette within a texel both are right: 4 % measured.
-    wrong = (np.asarray(found.values) > 1e-9) & hidden & (np.asarray(weights.values) > 1e-9)
-    assert wrong.mean() < (0.005 if dense else 0.001)
-    lost = (np.asarray(found.values) < 1e-9) & ~hidden & (np.asarray(weights.values) > 1e-3)
-    assert lost.mean() < 0.06
-    # With weights that are not negative, the rest is what they were, divided by its sum.
-    kept = np.where(np.asarray(found.values) > 0, weights.values, 0)
-    whole = (hidden.sum(axis=1) == 0) & (lost.sum(axis=1) == 0)
-    np.testing.assert_allclose(found.values[whole], kept[whole], rtol=0, atol=0.5)
+    values, given = np.asarray(found.values), np.asarray(weights.values)
+    np.testing.assert_allclose(values.sum(axis=1), 1, rtol=0, atol=1e-15)  # 4e-16
+    # Texels cannot tell where the direction passes the box's silhouette within one of them: of the
+    # pairs 0.4 % are seen through it and 0.07 % are not seen beside it, and none of the grid's.
+    wrong = (values > 1e-9) & hidden & (given > 1e-9)
+    assert wrong.mean() < (0.004 if dense else 1e-9)
+    lost = (values < 1e-9) & ~hidden & (given > 1e-3)
+    assert lost.mean() < (0.0008 if dense else 1e-9)
+    # The rest is what it was, divided by its sum: in 40 % and 99.3 % of the rows to rounding. The
+    # others move the mean of what rows are off to 0.009 and 0.0006; it is 0.46 as they were given.
+    seen = np.where(hidden, 0, given)
+    off = np.abs(values - seen / seen.sum(axis=1, keepdims=True)).sum(axis=1)
+    assert (off < 1e-14).mean() > (0.39 if dense else 0.99)
+    assert off.mean() < (0.0095 if dense else 0.0006)
 
 
 @pytest.mark.slow
@@ -105,9 +110,9 @@ def test_slopes_are_those_of_differences(rng, grid, cubes):
         weights = midrange.inverse_distance_weights(x, grid.points, exponent=2.0)
         return jnp.sum(factors * midrange.visible_weights(weights, cubes, x).values)
 
-    # Short steps: kinks are as close as texels' centers. 3e-8 measured.
+    # Short steps: kinks are as close as texels' centers. 2.3e-9 measured.
     jax.test_util.check_grads(
-        weigh, (x,), order=1, modes=["fwd", "rev"], atol=2e-7, rtol=0, eps=1e-7
+        weigh, (x,), order=1, modes=["fwd", "rev"], atol=4e-9, rtol=0, eps=1e-7
     )
 
 
