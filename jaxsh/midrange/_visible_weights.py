@@ -12,7 +12,7 @@ from ._cube import RadianceCube
 from ._expansion import check_positions
 from ._weights import Weights
 
-# Below this sum of weights that are left, the rest is not scaled up to one: nothing sees the place.
+# Below this sum of positive weights that are left, all fade out: next to nothing sees the place.
 _LEAST = 1e-3
 # Positions of a block on one CPU, times samples: what is looked up for them stays in cache.
 _PAIRS = 2**14
@@ -37,7 +37,7 @@ def visible_weights(
 
     **Arguments**
 
-    - `weights`: of S samples at V positions.
+    - `weights`: of S samples at V positions, which sum to one.
     - `cubes`: captured at the samples' points, S of them, of any resolution. What is smaller than a
       texel hides nothing.
     - `positions`: (V, 3).
@@ -45,9 +45,10 @@ def visible_weights(
       Surfaces that bend within a texel need more, or hide themselves.
 
     **Returns** `Weights` of the same samples and in the same order. Their sum is one, but zero
-    where no sample sees the position: it is left black. Where all samples do, they are as they
-    were. Elsewhere they lose linear precision, so that `interpolate`'s rule "half" does not fit.
-    `shade` takes them too.
+    where no sample of positive weight sees the position: it is left black. In between, below 0.001
+    of positive weights, they fade out. Where all samples see it, they are as they were. Elsewhere
+    they lose linear precision, so that `interpolate`'s rule "half" does not fit. `shade` takes them
+    too.
 
     Differentiable in weights and positions, forward and reverse, with kinks where the direction
     passes a texel's center and steps where a position crosses a surface; constant in the cubes.
@@ -110,8 +111,11 @@ def _visible(planes, samples, positions, values, *cell, resolution: int, toleran
         # What the others lose goes to the samples that see the position. Without negative weights
         # this divides by what is left.
         given = jnp.maximum(values, 0) * visible
-        share = given / jnp.maximum(jnp.sum(given, axis=-1, keepdims=True), _LEAST)
-        return kept + (1 - jnp.sum(kept, axis=-1, keepdims=True)) * share
+        total = jnp.sum(given, axis=-1, keepdims=True)
+        share = given / jnp.maximum(total, _LEAST)
+        whole = kept + (1 - jnp.sum(kept, axis=-1, keepdims=True)) * share
+        # Negative weights alone, without those that they correct, would be negative light.
+        return whole * jnp.minimum(total / _LEAST, 1)
 
     columns = values.shape[1]
     size, bytes_of_row = max(1, _PAIRS // columns), 24 * columns * values.dtype.itemsize

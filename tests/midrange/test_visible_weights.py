@@ -96,9 +96,20 @@ def test_positions_that_no_sample_sees_stay_black():
     walls = midrange.Scene([LAMP], [box(0.3)])
     points = np.array([[-1.0, 0, 0], [1, 0, 0]])
     cubes = midrange.capture(walls, points, 8)
-    weights = midrange.inverse_distance_weights(np.zeros((1, 3)), points)
+    between = np.zeros((1, 3))
+    weights = midrange.inverse_distance_weights(between, points)
+    np.testing.assert_array_equal(midrange.visible_weights(weights, cubes, between).values, 0)
+
+
+def test_a_negative_weight_alone_does_not_count():
+    """Of two samples beside a box, only the first sees a position beside it."""
+    points, position = np.array([[-1.0, 0, 0], [1, 0, 0]]), np.array([[-0.9, 0, 0]])
+    cubes = midrange.capture(midrange.Scene([LAMP], [box(0.3)]), points, 8)
+    weights = midrange.Weights(jnp.array([[-0.5, 1.5]]))
+    np.testing.assert_array_equal(midrange.visible_weights(weights, cubes, position).values, 0)
+    weights = midrange.Weights(jnp.array([[1.5, -0.5]]))
     np.testing.assert_array_equal(
-        midrange.visible_weights(weights, cubes, np.zeros((1, 3))).values, 0
+        midrange.visible_weights(weights, cubes, position).values, [[1, 0]]
     )
 
 
