@@ -13,7 +13,8 @@ from ._result import AdaptiveResult
 from ._shade import shade
 from ._staged import StagedTransfer, stage
 from ._tile_atlas import TileAtlas, TileFollower, make_tile_atlas
-from ._tiles import Tiles, TileSet, arrange, make_tiles
+from ._tile_set import TileSet
+from ._tiles import Tiles, arrange, make_tiles
 from ._tiling import Tiling, make_tiling
 from ._two_stage import TwoStage
 

@@ -16,7 +16,8 @@ from ._local_rule import check_rule, local_rule
 from ._method import check_known
 from ._sharing import sharing
 from ._tile_samples import places
-from ._tiles import DIRECTIONS, EXPONENT, TileSet, arrange, arranged_in_slices
+from ._tile_set import TileSet
+from ._tiles import DIRECTIONS, EXPONENT, arrange, arranged_in_slices
 from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling, vertex_areas
 
 # Slices of a set on an accelerator: at 50,000 vertices and degree 10 one is some 3,000 vertices.

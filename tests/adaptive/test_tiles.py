@@ -11,7 +11,7 @@ from jaxsh.adaptive import (
     Tiles,
     Tiling,
     _local_rule,
-    _tiles,
+    _tile_set,
     arrange,
     make_tile_atlas,
     make_tiles,
@@ -151,10 +151,10 @@ def test_frames_reuse_compiled_code(ball, light):
     eyes = [EYE, -EYE]
     tiles = [make_tiles(ball, eye, num_tiles=8, block=16) for eye in eyes]
     tiles[0](light, EYE, MATERIAL)
-    before = _tiles._shade_tiles._cache_size()
+    before = _tile_set._shade_tiles._cache_size()
     for eye, tile_set in zip(eyes, reversed(tiles), strict=True):
         tile_set(-light, eye, MATERIAL)
-    assert _tiles._shade_tiles._cache_size() == before
+    assert _tile_set._shade_tiles._cache_size() == before
 
 
 def test_tiles_differentiate_as_the_full_computation(ball, light, rng):
