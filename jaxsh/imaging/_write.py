@@ -156,9 +156,8 @@ def _write(path: Path, pixels: np.ndarray) -> None:
     spec.attribute("oiio:UnassociatedAlpha", 1)
     spec.attribute("jpeg:subsampling", "4:4:4")
     spec.attribute("CompressionQuality", 95)
-    spec.attribute(
-        "DateTime", ""
-    )  # else OpenEXR's writer stores when it was: other bytes each time
+    # Else OpenEXR's writer stores when it was: other bytes each time.
+    spec.attribute("DateTime", "")
     out = oiio.ImageOutput.create(str(path))
     if out is None:
         raise OSError(f"{path}: {oiio.geterror()}")
