@@ -4,7 +4,7 @@ What a mistaken picture would give is a picture too, so each mistake is named wi
 it. All but the values is known at trace time.
 """
 
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +12,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .checks import at_hand, check_finite, said_dtype
+
+# What stands beyond the edges of a texture.
+Wrap = Literal["repeat", "clamp", "mirror"]
 
 
 def as_radiance(name: str, value: Any) -> Float[Array, "..."]:

@@ -1,10 +1,13 @@
 """The base color of a part of a surface."""
 
-from typing import Literal
+from typing import get_args
 
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float, UInt8
+
+from .._core.checks import check_choice
+from .._core.pictures import Wrap
 
 
 class BaseColor(eqx.Module):
@@ -14,7 +17,8 @@ class BaseColor(eqx.Module):
     alpha, shape (h, w, 4), its top row at v = 1. `double_sided` is what the file says of it.
     `unlit`: the base color is what the surface sends out already, under no other light
     (KHR_materials_unlit of glTF). `wrap`: what stands beyond [0, 1], "repeat", "clamp" or "mirror"
-    as in `imaging.sample_texture`; between the outermost texels and the edge too.
+    as in `imaging.sample_texture`; between the outermost texels and the edge too;
+    another raises `ValueError`.
 
     **Example**
 
@@ -33,4 +37,7 @@ class BaseColor(eqx.Module):
     texture: UInt8[Array | np.ndarray, "h w 4"] | None = None
     double_sided: bool = eqx.field(static=True, default=False)
     unlit: bool = eqx.field(static=True, default=False)
-    wrap: Literal["repeat", "clamp", "mirror"] = eqx.field(static=True, default="repeat")
+    wrap: Wrap = eqx.field(static=True, default="repeat")
+
+    def __check_init__(self):
+        check_choice("wrap", self.wrap, get_args(Wrap))

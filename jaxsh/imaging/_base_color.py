@@ -9,11 +9,12 @@ from jaxtyping import Array, Float, Int
 
 from .._core.checks import at_hand, check_type
 from .._core.linalg import einsum
+from .._core.pictures import Wrap
 from .._core.xla import keep_rows
 from ..geometry import BaseColor, Mesh, Texels
 from ._display import srgb_decode
 from ._raster import Raster
-from ._texture import Pyramid, Wrap, longer_step, pyramid, sample
+from ._texture import Pyramid, longer_step, pyramid, sample
 
 
 def base_color(mesh: Mesh, at: Raster | Texels | None = None) -> Float[Array, "*shape 3"]:

@@ -1,7 +1,7 @@
 """Pictures looked up at texture coordinates: bilinear, and mip-mapped where the step is known."""
 
 import functools
-from typing import Literal, NamedTuple
+from typing import NamedTuple, get_args
 
 import jax
 import jax.numpy as jnp
@@ -9,11 +9,8 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._core.checks import as_float, check_choice
-from .._core.pictures import as_picture, as_radiance, check_values
+from .._core.pictures import Wrap, as_picture, as_radiance, check_values
 from .._core.xla import keep_rows, rounded_once
-
-Wrap = Literal["repeat", "clamp", "mirror"]
-_WRAPS = ("repeat", "clamp", "mirror")
 
 
 def sample_texture(
@@ -58,7 +55,7 @@ def sample_texture(
     >>> imaging.sample_texture(texture, uv).ravel().tolist()
     [2.0, 1.5, 1.0]
     """
-    check_choice("wrap", wrap, _WRAPS)
+    check_choice("wrap", wrap, get_args(Wrap))
     texture = as_picture("texture", texture)
     check_values("texture", texture)
     uv = as_radiance("uv", uv)

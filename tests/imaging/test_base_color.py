@@ -240,6 +240,8 @@ def test_what_does_not_fit_is_refused(raster, unchecked):
     turned = dataclasses.replace(mesh, faces=mesh.faces[::-1])
     with pytest.raises(ValueError, match="expected texels of this mesh, with its 2 faces"):
         base_color(turned, held)
+    with pytest.raises(ValueError, match=r"wrap must be one of .* did you mean 'mirror'"):
+        BaseColor(texture=CODES, wrap="mirrored")
     with pytest.raises(TypeError, match="expected at as a Raster or a Texels"):
         base_color(mesh, "raster")
     with pytest.raises(ValueError, match=r"expected color \(16, 20, 3\), one for each sample"):
