@@ -8,12 +8,11 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._core.checks import at_hand, check_type
-from .._core.linalg import einsum
 from .._core.pictures import Wrap
 from .._core.xla import keep_rows
 from ..geometry import BaseColor, Mesh, Texels
 from ._display import srgb_decode
-from ._raster import Raster
+from ._raster import Raster, between
 from ._texture import Pyramid, longer_step, pyramid, sample
 
 
@@ -188,17 +187,16 @@ def _colors(mesh: Mesh, face, barycentric, footprint):
     material = _material(mesh, face)
     color = surface.factor[material]
     at = jnp.asarray(mesh.faces)[face]
-    weights = barycentric.astype(color.dtype)
     if surface.textures is not None:
         assert mesh.uv is not None
-        uv = einsum("...kc,...k->...c", mesh.uv[at], weights.astype(mesh.uv.dtype))
+        uv = between(mesh.uv[at], barycentric)
         picture = surface.picture[material]
         squared = None
         if footprint is not None:
             squared = longer_step(footprint, *_sizes(surface.textures, picture))
         color = color * _looked_up(surface, material, uv, squared)
     if mesh.colors is not None:
-        color = color * einsum("...kc,...k->...c", mesh.colors[at][..., :3], weights)
+        color = color * between(mesh.colors[at][..., :3].astype(color.dtype), barycentric)
     return color
 
 

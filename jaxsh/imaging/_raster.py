@@ -173,9 +173,8 @@ def _interpolate(raster: Raster, values, background, color):
         seen = values
         if values.ndim == 2:
             # The background's -1 would be the last face, but its weights are zero.
-            corners = values[raster.faces[jnp.maximum(raster.face, 0)]]
-            weights = raster.barycentric.astype(values.dtype)
-            seen = einsum("hwkc,hwk->hwc", corners, weights)
+            at = raster.faces[jnp.maximum(raster.face, 0)]
+            seen = between(values[at], raster.barycentric)
         seen = seen if color is None else seen * color
         seen = jnp.where((raster.face >= 0)[..., None], seen, 0)
         seen = _resolve(seen, raster.samples)
@@ -186,6 +185,13 @@ def _interpolate(raster: Raster, values, background, color):
     if rows_are_split(raster.face):
         return keep_rows(pixels, raster, values, background, color, like=raster.face, axis=0, out=0)
     return keep_rows(pixels, raster, values, background, color, like=values, axis=0, out=None)
+
+
+def between(
+    corners: Float[Array, "*shape 3 c"], barycentric: Float[Array, "*shape 3"]
+) -> Float[Array, "*shape c"]:
+    """Take the mean of what is at the corners of faces, by weights, in the dtype of the former."""
+    return einsum("...kc,...k->...c", corners, barycentric.astype(corners.dtype))
 
 
 def _resolve(samples: Float[Array, "hn wn c"], n: int) -> Float[Array, "h w c"]:
@@ -200,8 +206,7 @@ def _in_texture(vertices, faces, uv, face, barycentric, camera: Camera):
     seen = face >= 0
     at = faces[jnp.maximum(face, 0)]
     corners = vertices[at]
-    weights = barycentric.astype(vertices.dtype)
-    point = einsum("hwkc,hwk->hwc", corners, weights)
+    point = between(corners, barycentric)
     first, second = corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
     across = jnp.cross(first, second)
     squared = jnp.sum(across * across, axis=-1)
@@ -227,5 +232,5 @@ def _in_texture(vertices, faces, uv, face, barycentric, camera: Camera):
         c = jnp.sum(jnp.cross(first, move) * across, axis=-1, keepdims=True) / squared
         change = b.astype(uv.dtype) * edges[..., 0, :] + c.astype(uv.dtype) * edges[..., 1, :]
         columns.append(jnp.where(usable[..., None], change, 0))
-    place = einsum("hwkc,hwk->hwc", texture, barycentric.astype(uv.dtype))
+    place = between(texture, barycentric)
     return jnp.where(seen[..., None], place, 0), jnp.stack(columns, axis=-1)
