@@ -16,7 +16,10 @@ _MOST_BYTES = 512 << 20  # of graphics memory
 
 
 def split_material(albedo: Any) -> tuple[Float[ArrayLike, "..."], Material | None]:
-    """Split off the diffuse albedo; raises `ValueError` for gloss that differs by vertex."""
+    """Split off the diffuse albedo.
+
+    Raises `ValueError` for gloss that differs by vertex, and for a roughness.
+    """
     if not isinstance(albedo, Material):
         return albedo, None
     if albedo.exponent is None:

@@ -51,8 +51,7 @@ class Still:
             white = shaded(*first, self.transfer, diffuse, camera.position, self.lamp)
             color = base_color(self.mesh, raster).astype(sent.dtype)
             seen = seen + looked_up(self.surface, raster, white) * (color - 1)
-        mean = interpolate(raster, jnp.ones((len(self.mesh.vertices), 3), sent.dtype), color=seen)
-        return _encoded(mean, raster.alpha, header["exposure"])
+        return _encoded(interpolate(raster, seen), raster.alpha, header["exposure"])
 
 
 def _encoded(radiance: Float[Array, "h w 3"], alpha: Float[Array, "h w"], exposure: float) -> bytes:
