@@ -1,4 +1,7 @@
-"""UV and base color of a mesh: at its vertices, and at what a camera sees."""
+"""UV and base color of a mesh: at its vertices, and at what a camera sees.
+
+Where errors of 1e-14 are let pass, at most 5e-16 were measured.
+"""
 
 import dataclasses
 
@@ -90,14 +93,14 @@ def test_base_color_is_factor_times_texture_times_vertex_color(raster):
     corners = np.asarray(mesh.colors)[np.asarray(mesh.faces)[face], :3]
     expected *= np.einsum("hwk,hwkc->hwc", weights, corners)
     expected[face < 0] = 0
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
     # Drawn: the mean over samples of light times color.
     light = jnp.linspace(0.5, 2, 12).reshape(4, 3)
     image = interpolate(raster, light, 0.25, color=found)
     at = np.einsum("hwk,hwkc->hwc", weights, np.asarray(light)[np.asarray(mesh.faces)[face]])
     drawn = np.where(face[..., None] < 0, 0.25, at * expected)
     drawn = drawn.reshape(8, 2, 10, 2, 3).mean((1, 3))
-    np.testing.assert_allclose(image, drawn, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(image, drawn, rtol=0, atol=1e-14)
 
 
 @pytest.mark.slow
@@ -114,7 +117,7 @@ def test_base_color_at_vertices_is_the_mean_over_their_faces():
     red = np.array([0.9, 0.1, 0.2])
     expected = np.stack([(seen[0] + red) / 2, red, (seen[2] + red) / 2, seen[3]])
     expected = expected * np.asarray(mesh.colors)[:, :3]
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
 
 
 @pytest.mark.slow
@@ -128,12 +131,12 @@ def test_base_color_at_texels_is_filtered_over_them():
     step = np.broadcast_to(np.diag([1 / 3, -1 / 4]), (12, 2, 2))
     found = base_color(atlas, held)
     expected = sample_texture(picture, held.uv, jnp.asarray(step))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
     # uv = A (x, z) and (x, z) = 2 (u, v) - 1 of the atlas.
     turn = np.array([[0.4, 0.3], [-0.2, 0.7]])
     uv = (2 * np.asarray(held.uv) - 1) @ turn.T
     expected = sample_texture(picture, jnp.asarray(uv), jnp.asarray(2 * turn @ step))
-    np.testing.assert_allclose(base_color(mesh, held), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(base_color(mesh, held), expected, rtol=0, atol=1e-14)
 
 
 @pytest.mark.slow
@@ -158,7 +161,7 @@ def test_textures_go_on_as_their_materials_say(raster):
     folded = np.where(mirror[..., None], 1 - abs(1 - uv % 2), uv)
     expected = sample_texture(texture, jnp.asarray(folded), raster.footprint, wrap="clamp")
     on_sheet = np.asarray(raster.face) >= 0
-    np.testing.assert_allclose(seen[on_sheet], expected[on_sheet], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(seen[on_sheet], expected[on_sheet], rtol=0, atol=1e-14)
 
 
 def test_a_mesh_without_colors_is_white(raster):
@@ -186,10 +189,10 @@ def test_base_color_differentiates_in_what_is_no_code(raster, rng):
     ahead, behind = (
         loss(*(a + s * 1e-6 * b for a, b in zip(start, step, strict=True))) for s in (1, -1)
     )
-    np.testing.assert_allclose(slope, (ahead - behind) / 2e-6, rtol=1e-6)
+    np.testing.assert_allclose(slope, (ahead - behind) / 2e-6, rtol=1e-8)
     gradient = jax.grad(loss, (0, 1, 2))(*start)
     total = sum(jnp.sum(a * b) for a, b in zip(gradient, step, strict=True))
-    np.testing.assert_allclose(total, slope, rtol=1e-12)
+    np.testing.assert_allclose(total, slope, rtol=1e-14)
 
 
 @pytest.mark.slow
