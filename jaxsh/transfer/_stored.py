@@ -27,9 +27,10 @@ _USUAL = {"surface": "vertices", "cosine": True}  # of a store that does not say
 class StoredTransfer:
     """Stands for the transfer in a store on disk, which may be larger than the memory.
 
-    Made by `open`. `shade_diffuse` and `shade_glossy` take it as they take a `Transfer`, and go
-    through its blocks, the next of which is read while one is shaded; `blocks` does so for any
-    other purpose. All other functions take the `Transfer` that `load` gives, or `sharded`.
+    Made by `open`. `shade_diffuse`, `shade_glossy`, `fluence` and `compress` take it as they take a
+    `Transfer`, and go through its blocks, the next of which is read while one is used; `blocks`
+    does so for any other purpose. All other functions take the `Transfer` that `load` gives, or
+    `sharded`.
 
     **Example**
 
