@@ -15,7 +15,6 @@ from .._core.checks import (
     check_known,
     check_size,
     check_type,
-    described,
     is_concrete,
 )
 from ._bake._passes import progress_bar
@@ -102,7 +101,7 @@ def compress(
     ):
         if value > most:
             raise ValueError(f"expected {name} of at most the {most} {of}, got {value}")
-    generator = _generator(seed)
+    generator = np.random.default_rng(check_size("seed", seed, least=0))
     learned = min(count, max(_LEARNED_FROM, 64 * clusters))
     with progress_bar(
         iterations * learned + count, check_flag("progress", progress), "compress"
@@ -117,12 +116,6 @@ def compress(
             weights[:, part], cluster[part] = near.weights.T, near.cluster
             bar.update(len(block))
     return _rounded(transfer, found, weights, cluster, scale)
-
-
-def _generator(seed: Any) -> np.random.Generator:
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ValueError(f"expected seed as an integer >= 0, got {described(seed)}")
-    return np.random.default_rng(int(seed))
 
 
 class _Clusters(NamedTuple):

@@ -205,7 +205,7 @@ def test_a_stored_transfer_is_read_block_by_block(tmp_path):
         ({"clusters": V + 1}, "clusters of at most the 60 points, got 61"),
         ({"components": K + 1}, "components of at most the 9 coefficients, got 10"),
         ({"iterations": 0}, "iterations"),
-        ({"seed": -1}, "seed as an integer >= 0, got -1"),
+        ({"seed": -1}, "seed must be an integer >= 0, got -1"),
     ],
 )
 def test_bad_options_are_refused(made, options, message):
