@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from derivatives import check_derivatives
 
 from jaxsh import adaptive, harmonics, sphere
 from jaxsh.transfer import (
@@ -164,30 +165,12 @@ def test_derivatives_of_the_lobe(rng):
 @pytest.mark.slow
 def test_derivatives_of_what_is_seen(rng):
     made, light, material = frame(rng)
-    weights = jnp.asarray(rng.normal(size=(18, 3)))
 
     def shade(eye, specular, roughness):
         return shade_glossy(light, made, eye, Material.ggx(0.1, specular, roughness))
 
     arguments = jnp.asarray(EYE), material.specular, material.lobe[1]
-    along = tuple(jnp.asarray(rng.normal(size=a.shape)) for a in arguments)
-    step = 1e-5
-
-    @jax.jit
-    def derivatives():
-        def at(t):
-            return shade(*jax.tree.map(lambda a, d: a + t * d, arguments, along))
-
-        forward = jax.jvp(shade, arguments, along)[1]
-        slopes = jax.vjp(shade, *arguments)[1](weights)
-        ends = jax.lax.map(at, jnp.asarray([-step, step]))
-        return forward, slopes, (ends[1] - ends[0]) / (2 * step)
-
-    forward, slopes, difference = derivatives()
-    np.testing.assert_allclose(forward, difference, rtol=0, atol=1e-7 * np.abs(forward).max())
-    backward = sum(float(jnp.sum(s * d)) for s, d in zip(slopes, along, strict=True))
-    np.testing.assert_allclose(backward, jnp.sum(weights * forward), rtol=1e-10, atol=0)
-    assert all(np.abs(slope).max() > 0 for slope in slopes)
+    check_derivatives(shade, arguments, rng)
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from derivatives import check_derivatives
 
 from jaxsh import harmonics
 from jaxsh.transfer import (
@@ -215,25 +216,7 @@ def test_glossy_derivatives(rng, form):
         jnp.asarray(rng.uniform(size=(3, 3))),
         jnp.asarray([3.0, 20.0, 60.0]),
     )
-    # As `check_grads` does, but forward, reverse and the differences in one program.
-    along = tuple(jnp.asarray(rng.normal(size=a.shape)) for a in arguments)
-    weights, step = jnp.asarray(rng.normal(size=(3, 3))), 1e-5
-
-    @jax.jit
-    def derivatives():
-        def at(t):
-            return shade(*jax.tree.map(lambda a, d: a + t * d, arguments, along))
-
-        forward = jax.jvp(shade, arguments, along)[1]
-        slopes = jax.vjp(shade, *arguments)[1](weights)
-        ends = jax.lax.map(at, jnp.asarray([-step, step]))
-        return forward, slopes, (ends[1] - ends[0]) / (2 * step)
-
-    forward, slopes, difference = derivatives()
-    np.testing.assert_allclose(forward, difference, rtol=1e-5, atol=1e-6)
-    backward = sum(float(jnp.sum(s * d)) for s, d in zip(slopes, along, strict=True))
-    np.testing.assert_allclose(backward, jnp.sum(weights * forward), rtol=1e-10)
-    assert all(np.abs(slope).max() > 0 for slope in slopes)
+    check_derivatives(shade, arguments, rng)
 
 
 def test_glossy_maps_over_lights_and_eyes(rng):
