@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsh.geometry import Mesh, make_mesh
+from jaxsh.geometry import Mesh, Texels, make_mesh
 from jaxsh.harmonics import clamped_cosine, convolve, evaluate
 
 
@@ -102,6 +102,32 @@ def bowl(opening: float, rows: int, columns: int) -> Mesh:
     return by_hand(vertices, faces, -vertices)
 
 
+def texels_at(mesh: Mesh, face, barycentric) -> Texels:
+    """Texels anywhere on a mesh, in a picture of one row."""
+    corners, count = np.asarray(mesh.faces)[face], len(face)
+    places, normals = (
+        np.einsum("nkc,nk->nc", np.asarray(array)[corners], barycentric)
+        for array in (mesh.vertices, mesh.normals)
+    )
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Texels(
+        positions=jnp.asarray(places, jnp.float32),
+        normals=jnp.asarray(normals, jnp.float32),
+        uv=jnp.zeros((count, 2), jnp.float32),
+        face=jnp.asarray(face, jnp.int32),
+        barycentric=jnp.asarray(barycentric, jnp.float32),
+        source=jnp.arange(count, dtype=jnp.int32)[None],
+        mesh=mesh,
+        vertex=jnp.arange(len(mesh.vertices), dtype=jnp.int32),
+    )
+
+
+def texels_at_vertices(mesh: Mesh) -> Texels:
+    """One texel a vertex, in a corner of one of its faces."""
+    _, first = np.unique(np.asarray(mesh.faces), return_index=True)
+    return texels_at(mesh, first // 3, np.eye(3)[first % 3])
+
+
 def unshadowed(mesh, degree: int) -> np.ndarray:
     """λ_l y_lm(n), in blocks of one size: one program for all."""
     normals = np.asarray(mesh.normals, np.float32)
@@ -125,3 +151,9 @@ def lune(start: float, end: float, degree: int) -> np.ndarray:
     measure = np.multiply.outer((end - start) / 2 * weights, np.pi / 2 * weights * np.cos(b))
     basis = np.asarray(evaluate(directions, degree))
     return np.einsum("ab,abk->k", measure * directions[..., 2], basis)
+
+
+def relative(value, reference):
+    """RMS error of all coefficients, as a share of their RMS."""
+    value, reference = np.asarray(value), np.asarray(reference)
+    return np.linalg.norm(value - reference) / np.linalg.norm(reference)

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from bodies import relative
 from jax.sharding import AxisType, NamedSharding, PartitionSpec
 
 from jaxsh.geometry import (
@@ -28,10 +29,6 @@ from jaxsh.transfer._bake._directions import guided
 
 def baked(mesh, degree=4, **options):
     return np.asarray(bake(mesh, degree, progress=False, **options).coefficients)
-
-
-def relative(value, reference):
-    return np.linalg.norm(value - reference) / np.linalg.norm(reference)
 
 
 @pytest.mark.parametrize("body", [bodies.ball, bodies.cube])

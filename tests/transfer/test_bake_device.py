@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import lowered.loops
 import numpy as np
 import pytest
+from bodies import relative
 
 from jaxsh.geometry import JaxRayScene, Mesh, Points, _cast, knot, ray_scene, vertex_normals
 from jaxsh.transfer import bake
@@ -35,10 +36,6 @@ def baked(mesh=MESH, degree=3, **options):
 @functools.cache
 def whole(bounces):
     return baked(device=True, bounces=bounces)
-
-
-def relative(value, reference):
-    return np.linalg.norm(value - reference) / np.linalg.norm(reference)
 
 
 @bounces_too
