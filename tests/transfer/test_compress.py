@@ -63,12 +63,12 @@ def test_clusters_that_are_planes_are_found(made, small):
 def test_one_cluster_is_its_principal_components(made):
     rows = np.asarray(made.coefficients)
     left = np.linalg.svd(rows - rows.mean(axis=0), compute_uv=False)
-    for number in (1, 4, K):
+    # What weights in 8 bits add, measured: 0.0034, 0.016 and 0.277.
+    for number, most in ((1, 0.004), (4, 0.02), (K, 0.3)):
         got = coefficients(compress(made, clusters=1, components=number))
         error = np.sqrt(np.sum((got - rows) ** 2))
         exact = np.sqrt(np.sum(left[number:] ** 2))
-        # Weights in 8 bits: measured, at most 0.27 more.
-        assert exact <= error < exact + 0.3
+        assert exact <= error < exact + most
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_other_ones(made, small):
@@ -105,11 +105,11 @@ def check_glossy(small, given, atol):
 
 
 def test_shading_is_that_of_the_decompressed(small, rng):
-    check_diffuse(small, lights(rng, np.float64)[0], 1e-13)
+    check_diffuse(small, lights(rng, np.float64)[0], 2e-15)
     volume = dataclasses.replace(small, cosine=False, surface="points")
     light, *_ = lights(rng, np.float64)
     got, expected = fluence(light, volume), np.pi * shade_diffuse(light, small, 1.0)
-    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-14)
     assert (volume.decompressed().surface, volume.decompressed().cosine) == ("points", False)
     with pytest.raises(ValueError, match=r"transfer\.fluence takes"):
         shade_diffuse(light, volume, 0.5)
@@ -119,15 +119,16 @@ def test_values_in_directions_are_those_of_the_decompressed(small, rng):
     """What glossy shading takes; the slow test shades."""
     basis, same = jnp.asarray(rng.normal(size=(2, 4))), small.decompressed()
     np.testing.assert_allclose(
-        small.at_nodes(basis, 4), same.at_nodes(basis, 4), rtol=0, atol=1e-12
+        small.at_nodes(basis, 4), same.at_nodes(basis, 4), rtol=0, atol=2e-14
     )
     np.testing.assert_array_equal(small.normal_rows(), same.normal_rows())
     assert small.glossy_form(1) is small
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("dtype", "atol"), [(np.float32, 2e-4), (np.float64, 1e-12)])
+@pytest.mark.parametrize(("dtype", "atol"), [(np.float32, 3e-6), (np.float64, 6e-15)])
 def test_all_shading_is_that_of_the_decompressed(made, dtype, atol, rng):
+    """Measured: up to 9.5e-7 in float32, 1.8e-15 in float64."""
     small = compress(made.astype(dtype), clusters=CLUSTERS, components=COMPONENTS)
     for given in lights(rng, dtype):
         check_diffuse(small, given, atol)
@@ -165,13 +166,13 @@ def test_more_components_and_clusters_leave_less():
 def test_what_is_degenerate(made):
     alike = dataclasses.replace(made, coefficients=jnp.ones((V, K)))
     np.testing.assert_allclose(
-        coefficients(compress(alike, clusters=5, components=3)), 1.0, rtol=2e-5
+        coefficients(compress(alike, clusters=5, components=3)), 1.0, rtol=0, atol=1e-15
     )
     zeros = dataclasses.replace(made, coefficients=jnp.zeros((V, K)))
     assert not coefficients(compress(zeros, clusters=V, components=K)).any()
     one = dataclasses.replace(made, **{name: getattr(made, name)[:1] for name in ARRAYS})
     np.testing.assert_allclose(
-        coefficients(compress(one, iterations=1)), one.coefficients, rtol=0, atol=2e-4
+        coefficients(compress(one, iterations=1)), one.coefficients, rtol=0, atol=1e-4
     )
     # Far from 1, and in sixteen bits, which could not hold the sums.
     far = dataclasses.replace(made, coefficients=1e30 * made.coefficients)
@@ -179,7 +180,7 @@ def test_what_is_degenerate(made):
     np.testing.assert_allclose(got, far.coefficients, rtol=0, atol=2e28)
     half = compress(made.astype(np.float16), clusters=CLUSTERS, components=COMPONENTS)
     assert half.dtype == np.float32
-    np.testing.assert_allclose(coefficients(half), made.coefficients, rtol=0, atol=0.03)
+    np.testing.assert_allclose(coefficients(half), made.coefficients, rtol=0, atol=0.02)
 
 
 def test_a_part_of_the_points_forms_the_clusters(made, monkeypatch):
