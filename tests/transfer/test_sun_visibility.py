@@ -1,11 +1,12 @@
 """Visibility of compact sources against the share of a disc that a wall leaves."""
 
-import jax.numpy as jnp
+import dataclasses
+
 import numpy as np
 import pytest
-from bodies import by_hand, points, rectangle
+from bodies import by_hand, points, rectangle, texels_at_vertices
 
-from jaxsh.geometry import JaxRayScene, Points, Texels, knot, ray_scene
+from jaxsh.geometry import JaxRayScene, Points, knot, ray_scene
 from jaxsh.sphere import Suns
 from jaxsh.transfer import shade_sun, sun_visibility
 
@@ -59,18 +60,8 @@ def test_a_wall_leaves_its_share_of_the_disc(rng, share, shaped):
 
 def test_points_and_texels_are_lit_as_vertices_are():
     mesh = knot(300)
-    _, first = np.unique(np.asarray(mesh.faces), return_index=True)
-    points, numbers = Points(mesh.vertices, mesh.normals), jnp.arange(300, dtype=jnp.int32)
-    atlas = Texels(
-        points.positions,
-        points.normals,
-        jnp.zeros((300, 2), jnp.float32),
-        face=jnp.asarray(first // 3, jnp.int32),
-        barycentric=jnp.asarray(np.eye(3)[first % 3], jnp.float32),
-        source=numbers[None],
-        mesh=mesh,
-        vertex=numbers,
-    )
+    points = Points(mesh.vertices, mesh.normals)
+    atlas = dataclasses.replace(texels_at_vertices(mesh), normals=mesh.normals)  # to the last bit
     expected = sun_visibility(sun(0.8), mesh).seen
     np.testing.assert_array_equal(sun_visibility(sun(0.8), atlas).seen, expected)
     np.testing.assert_array_equal(sun_visibility(sun(0.8), points, mesh).seen, expected)
