@@ -1,4 +1,7 @@
-"""The GGX lobe: against the true BRDF, integrated over incoming directions on a fine grid."""
+"""The GGX lobe: against the true BRDF, integrated over incoming directions on a fine grid.
+
+Other ways to the same sum leave its rounding: up to 2.7e-15 of the largest value was measured.
+"""
 
 import jax
 import jax.numpy as jnp
@@ -99,7 +102,7 @@ def test_fixed_views_and_lights_are_the_same_to_rounding(rng):
         fixed_light(light, made)(EYE, material, distant=True),
         fixed_view(made, EYE, material, distant=True)(light),
     ):
-        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-14 * np.abs(expected).max())
 
 
 @pytest.mark.slow
@@ -113,7 +116,7 @@ def test_samples_and_one_roughness_for_all(rng):
         shade_glossy(light, sample(made), EYE, one),
         shade_glossy(light, sample(made), EYE, many),
     ):
-        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-14 * np.abs(expected).max())
 
 
 @pytest.mark.slow
@@ -127,12 +130,12 @@ def test_the_adaptive_ones_too(rng):
         adaptive.TwoStage(**every, middle=2),
     ):
         got = adaptive.shade(light, made, EYE, material, method).color
-        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-14 * np.abs(expected).max())
     one = Material.ggx(0.1, material.specular, 0.4)
     got = adaptive.shade(
         light, made, EYE, one, adaptive.Anchors(threshold=0.0, base=1, quantized=False)
     ).color
-    np.testing.assert_allclose(got, shade_glossy(light, made, EYE, one), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(got, shade_glossy(light, made, EYE, one), rtol=0, atol=1e-14)
 
 
 def frame(rng, count=18):

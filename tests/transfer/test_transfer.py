@@ -84,16 +84,17 @@ def test_methods_that_look_at_neighbors_refuse_points(method):
 
 def test_fluence_is_the_product_of_coefficients(rng):
     lights = jnp.asarray(rng.normal(size=(2, 300, 3, 9)), jnp.float32)
+    # Measured: 5e-7, and 0.014 in eight bits.
     got = transfer.fluence(lights, VOLUME)
     expected = np.einsum("bvck,vk->bvc", *map(np.float64, (lights, VOLUME.coefficients)))
-    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-6)
     shared = transfer.fluence(lights[:, :1], VOLUME)
-    np.testing.assert_allclose(shared[0], transfer.fluence(lights[0, 0], VOLUME), rtol=0, atol=1e-5)
+    np.testing.assert_allclose(shared[0], transfer.fluence(lights[0, 0], VOLUME), rtol=0, atol=1e-6)
     np.testing.assert_allclose(
-        shared, np.einsum("bck,vk->bvc", lights[:, 0], VOLUME.coefficients), rtol=0, atol=1e-5
+        shared, np.einsum("bck,vk->bvc", lights[:, 0], VOLUME.coefficients), rtol=0, atol=1e-6
     )
     eights = transfer.fluence(lights[0, 0], transfer.quantize(VOLUME))
-    np.testing.assert_allclose(eights, shared[0], rtol=0, atol=0.05)
+    np.testing.assert_allclose(eights, shared[0], rtol=0, atol=0.02)
     with pytest.raises(ValueError, match="points without normals, got one with the cosine"):
         transfer.fluence(lights, MADE)
 
