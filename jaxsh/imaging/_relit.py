@@ -81,7 +81,7 @@ def write_relit(
     shown = _shown(radiance, len(surface.vertices), exposure)
     if textured:
         return write_mesh(path, _lit(path, surface, shown), up=up)
-    opaque = np.concatenate([shown, np.ones_like(shown[:, :1])], axis=1)
+    opaque = np.pad(shown, ((0, 0), (0, 1)), constant_values=1.0)
     if suffix == ".ply":
         codes = np.rint(255 * srgb.encode(opaque[:, :3]))
         opaque[:, :3] = srgb.decode(codes / 255)
@@ -138,7 +138,7 @@ def _lit(path: Path, mesh: Mesh, shown: Float[np.ndarray, "v 3"]) -> Mesh:
     if not mesh.materials and mesh.colors is None:
         raise ValueError(f"{path}: expected a mesh with materials or colors, to be left textured")
     check_materials(mesh)
-    colors = np.concatenate([shown, np.ones_like(shown[:, :1])], axis=1)
+    colors = np.pad(shown, ((0, 0), (0, 1)), constant_values=1.0)
     if mesh.colors is not None:
         colors = colors * np.asarray(mesh.colors, np.float64)
     own = tuple(dataclasses.replace(material, unlit=True) for material in mesh.materials)
