@@ -31,8 +31,9 @@ def base_color(mesh: Mesh, at: Raster | Texels | None = None) -> Float[Array, "*
       `Texels` of it: at them (n, 3), as `transfer` takes it for an albedo. Give the mesh that the
       texels were made of, also where it was unwrapped: `texels.mesh` has then lost its textures.
 
-    Raises `ValueError` where a texture has no UV to go by, materials do not say which faces they
-    are of, or a raster or texels are of another mesh, and `TypeError` for anything else in `at`.
+    Raises `ValueError` where a texture is not of 8-bit codes or has no UV to go by, materials do
+    not say which faces they are of, or a raster or texels are of another mesh, and `TypeError` for
+    anything else in `at`.
 
     Differentiable in factors, colors of the vertices and UV; not in textures, which are 8-bit
     codes: to fit one, decode it and use `sample_texture`. Runs under `jit`. Shards over the
@@ -63,7 +64,16 @@ def base_color(mesh: Mesh, at: Raster | Texels | None = None) -> Float[Array, "*
 
 
 def check_materials(mesh: Mesh) -> None:
-    """Raises `ValueError` where materials lack the UV or the faces that they go by."""
+    """Raises `ValueError` for textures that are no codes, and without UV or faces to go by."""
+    for i, material in enumerate(mesh.materials):
+        texture = material.texture
+        if texture is None:
+            continue
+        if texture.dtype != np.uint8 or texture.ndim != 3 or texture.shape[2] != 4:
+            raise ValueError(
+                f"expected the texture of material {i} as 8-bit sRGB (h, w, 4) in uint8, got "
+                f"{texture.dtype} and shape {texture.shape}"
+            )
     textured = any(material.texture is not None for material in mesh.materials)
     if textured and mesh.uv is None:
         raise ValueError(

@@ -243,6 +243,10 @@ def test_what_does_not_fit_is_refused(raster, unchecked):
     turned = dataclasses.replace(mesh, faces=mesh.faces[::-1])
     with pytest.raises(ValueError, match="expected texels of this mesh, with its 2 faces"):
         base_color(turned, held)
+    for texture in (CODES / 255, CODES[..., :3]):
+        wrong = dataclasses.replace(mesh.materials[0], texture=texture)
+        with pytest.raises(ValueError, match=r"texture of material 0 as 8-bit sRGB \(h, w, 4\)"):
+            base_color(dataclasses.replace(mesh, materials=(wrong, wrong)))
     with pytest.raises(ValueError, match=r"wrap must be one of .* did you mean 'mirror'"):
         BaseColor(texture=CODES, wrap="mirrored")
     with pytest.raises(TypeError, match="expected at as a Raster or a Texels"):
