@@ -1,6 +1,5 @@
 """Argument checks: one sentence that says what was expected and what came."""
 
-import difflib
 import math
 import operator
 import os
@@ -14,6 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
+
+from .words import article, described, nearest, said_dtype
 
 # A light, an eye, a few thousand albedos: looking at more would take time of every call.
 _FEW = 2**16
@@ -168,37 +169,10 @@ def _as_array(value: Any, name: str) -> Array:
         raise ValueError(f"expected real numbers{_for(name)}, got {described(value)}") from None
 
 
-def said_dtype(dtype: Any) -> str:
-    """Names a dtype; that of a picture's codes with the way to decode them."""
-    if dtype in (jnp.uint8, jnp.uint16):
-        return (
-            f"{dtype}: the codes of a picture, to be decoded to light by "
-            f"imaging.srgb_decode(image / {jnp.iinfo(dtype).max})"
-        )
-    return f"{dtype}"
-
-
-def described(value: Any) -> str:
-    """Says in a few words what was given."""
-    if value is None or isinstance(value, str | bool | int | float | complex | np.number):
-        text = repr(value)
-        return text if len(text) <= 60 else f"{text[:57]}…"
-    kind = type(value).__name__
-    if hasattr(value, "shape") and hasattr(value, "dtype"):
-        return f"an array of shape {value.shape} and dtype {value.dtype}"
-    if isinstance(value, list | tuple | dict | set):
-        return f"a {kind} of {len(value)}"
-    if isinstance(value, type):
-        return f"the class {value.__name__} itself"
-    if callable(value) and hasattr(value, "__name__"):
-        return f"the function {value.__name__}"
-    return f"{_article(kind)} {kind}"
-
-
 def check_type(name: str, value: Any, *classes: type) -> None:
     """Raises `TypeError` unless a value is of one of the classes."""
     if not isinstance(value, classes):
-        wanted = " or ".join(f"{_article(c.__name__)} {c.__name__}" for c in classes)
+        wanted = " or ".join(f"{article(c.__name__)} {c.__name__}" for c in classes)
         raise TypeError(f"expected {name} as {wanted}, got {described(value)}")
 
 
@@ -248,15 +222,6 @@ def check_options(name: str, options: Iterable[str], known: Iterable[str]) -> No
         if option not in known:
             near = nearest(option, known) or f"; it has {', '.join(known)}"
             raise TypeError(f"{name} has no option {option!r}{near}")
-
-
-def nearest(value: Any, options: Iterable[Any]) -> str:
-    """Says which option was meant, or nothing."""
-    if not isinstance(value, str):
-        return ""
-    known = [option for option in options if isinstance(option, str)]
-    near = difflib.get_close_matches(value.lower(), known, n=1)
-    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def check_flag(name: str, value: Any) -> bool:
@@ -366,7 +331,3 @@ def _integer(name: str, value: Any, least: int, more: str) -> int:
 
 def _for(name: str) -> str:
     return f" for {name}" if name else ""
-
-
-def _article(noun: str) -> str:
-    return "an" if noun[:1] in "AEIOUaeiou" else "a"
