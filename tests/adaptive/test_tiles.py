@@ -61,7 +61,6 @@ def test_tiles_are_exact_in_exact_directions(ball, light, dtype, tolerance):
     [pytest.param(jnp.float32, 2e-6, marks=pytest.mark.slow), (jnp.float64, 4e-14)],
     ids=["float32", "float64"],
 )
-@pytest.mark.slow
 def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolerance):
     """Degree 4, 40 of its 74 directions; tile by tile by hand, for two eyes."""
     degree, exponent, count = 4, 16.0, 70
@@ -134,7 +133,6 @@ def test_tiles_of_another_view_are_less_exact_and_no_more(ball, light):
         assert np.sqrt(np.mean((color - full) ** 2)) < 0.5 * np.std(full)
 
 
-@pytest.mark.slow
 def test_quantized_samples_are_half_a_scale_off(ball, light):
     plain, rounded = (
         make_tiles(ball, EYE, num_tiles=5, block=16, quantized=q) for q in (False, True)

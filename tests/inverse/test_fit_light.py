@@ -83,7 +83,6 @@ def dense(normals, albedo, weights, observed, noise):
     return light, spread
 
 
-@pytest.mark.slow
 def test_posterior(seen):
     normals, albedo, weights, light, observed = seen
     found = fits(None)(observed, normals, albedo, weights)

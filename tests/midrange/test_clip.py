@@ -73,10 +73,15 @@ def test_horizon_above_below_and_through_corners():
 
 
 def test_blocker_s_shadow_is_taken_away():
-    """At half the distance, so its shadow is twice its size; whichever way it faces."""
+    """At half the distance, so its shadow is twice its size; whichever way it faces.
+
+    Behind the light or the point there is none.
+    """
     inside = rectangle([0.1, 0.1, 1], [0, 0.2, 0], [0.3, 0, 0])
-    expected = (quadrature(WINDOW)[0] - quadrature(2 * inside)[0])[0]
-    for vertices in (inside, inside[::-1]):
+    whole = quadrature(WINDOW)[0][0]
+    left = whole - quadrature(2 * inside)[0][0]
+    cases = (inside, left), (inside[::-1], left), (3 * inside, whole), (-inside, whole)
+    for vertices, expected in cases:
         check(Polygon(WINDOW, ONE), np.zeros(3), expected, blockers=(Polygon(vertices, ONE),))
 
 

@@ -78,8 +78,9 @@ def test_monomials_in_float32_are_useless(full):
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-@pytest.mark.parametrize(("size", "error"), [("small", 1e-12), ("full", 1e-6)])
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("size", "error"), [("small", 1e-12), pytest.param("full", 1e-6, marks=pytest.mark.slow)]
+)
 def test_the_header_compiles_and_agrees(size, error, request, rng, tmp_path):
     fit, name = request.getfixturevalue(size), f"{size}_sky"
     (tmp_path / "sky.h").write_text(sky.c_header(fit, name))
