@@ -264,7 +264,7 @@ def test_dering_cannot_help_a_mean_that_is_not_positive(mean, rng):
     assert np.isfinite(slope_strength)
 
 
-@pytest.mark.parametrize("scale", [1e-20, pytest.param(1e20, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("scale", [1e-20, 1e20])
 @pytest.mark.slow
 def test_dering_does_not_depend_on_the_unit(scale, rng):
     c = lights(rng, 6).astype(np.float32)

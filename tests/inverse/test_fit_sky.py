@@ -83,7 +83,7 @@ def test_noise_does_what_the_confidence_says(baked, fit, rng):
     assert np.degrees(np.linalg.norm(measured[:3])) < 0.1
 
 
-@pytest.mark.parametrize("model", [glow, pytest.param(None, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("model", [glow, None])
 @pytest.mark.slow
 def test_the_solver_s_residual_is_that_of_shade_diffuse(model, baked, rng):
     """The few rows that the fit works on hold all V of them, with weights and colored albedo."""

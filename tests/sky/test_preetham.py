@@ -151,7 +151,7 @@ POINTS = {
 }
 
 
-@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.slow
 def test_derivatives_are_finite_everywhere(dtype):
     view, sun = (jnp.asarray(v, dtype) for v in map(np.stack, zip(*POINTS.values(), strict=True)))

@@ -124,9 +124,7 @@ def glow(view, sun, haze):
 
 
 @pytest.mark.parametrize("solver", ["qr", pytest.param("gauss-newton", marks=pytest.mark.slow)])
-@pytest.mark.parametrize(
-    "kind", [AxisType.Auto, pytest.param(AxisType.Explicit, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("kind", [AxisType.Auto, AxisType.Explicit])
 @pytest.mark.slow
 def test_fits_share_their_samples_out(solver, kind):
     """35 samples, so that one fills up, and two rounds of Lawson's."""
