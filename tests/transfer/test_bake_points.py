@@ -227,6 +227,7 @@ def test_points_that_see_nothing_are_counted_and_explained():
     ("options", "message"),
     [
         ({}, "points stop no rays: give scene, the mesh or the ray scene that shadows them, or"),
+        ({"scene": bodies.by_hand(*np.zeros((3, 0, 3)))}, "the scene has no vertices"),
         ({"scene": "knot"}, "expected scene as a RayScene or a Mesh, got 'knot'"),
         ({"scene": ray_scene(MESH), "bounces": 1}, "bounces=1 of points need the mesh that light"),
         ({"bounces": 1, "shadows": False}, "bounces=1 needs rays"),

@@ -171,18 +171,18 @@ def check_rays(mesh: Mesh, ray_bias: float | None, offset: float | None) -> None
 def check_mesh(name: str, mesh: Mesh) -> None:
     """Raise `ValueError` or `TypeError` where rays cannot be cast at a mesh."""
     check_type(name, mesh, Mesh)
-    vertices = as_host_float(mesh.vertices, "vertices of the mesh")
-    faces = as_host_integer(mesh.faces, "faces of the mesh")
-    as_host_float(mesh.normals, "normals of the mesh")
-    for name, dtype in (("vertices", vertices.dtype), ("normals", mesh.normals.dtype)):
+    vertices = as_host_float(mesh.vertices, f"vertices of the {name}")
+    faces = as_host_integer(mesh.faces, f"faces of the {name}")
+    as_host_float(mesh.normals, f"normals of the {name}")
+    for array, dtype in (("vertices", vertices.dtype), ("normals", mesh.normals.dtype)):
         if dtype not in (np.float32, np.float64):
-            raise ValueError(f"expected {name} of the mesh in float32 or float64, got {dtype}")
+            raise ValueError(f"expected {array} of the {name} in float32 or float64, got {dtype}")
     if len(vertices) == 0:
-        raise ValueError("the mesh has no vertices")
+        raise ValueError(f"the {name} has no vertices")
     if not np.isfinite(vertices).all():
         bad = int((~np.isfinite(vertices).all(axis=1)).sum())
-        raise ValueError(f"the mesh has {bad} NaN or infinite vertices; make_mesh drops such")
-    check_faces("the mesh", faces, len(vertices))
+        raise ValueError(f"the {name} has {bad} NaN or infinite vertices; make_mesh drops such")
+    check_faces(f"the {name}", faces, len(vertices))
 
 
 def _check_bias(ray_bias: float | None, offset: float | None) -> None:
