@@ -12,29 +12,14 @@ def main(request: dict) -> None:
             raise SystemExit("pinning to one core needs Linux: choose --cores all")
         os.sched_setaffinity(0, [min(os.sched_getaffinity(0))])
     import jax
-    import numpy as np
 
-    from . import basis, first_call, lat_long
+    from . import _sections
 
     jax.config.update("jax_enable_x64", request["dtype"] == "float64")
-    rounds = request["rounds"]
-    for degree in request["degrees"]:
-        if request["table"] == "basis":
-            for count in request["counts"]:
-                for row in basis.timings(degree, count, np.dtype(request["dtype"]), rounds):
-                    _emit(row | {key: request[key] for key in ("cores", "allocator")})
-        elif request["table"] == "lat_long":
-            for row in lat_long.timings(degree, 256, rounds):
-                _emit(row | {"cores": request["cores"]})
-        elif request["table"] == "first_call":
-            for row in first_call.timings(rounds):
-                _emit(row)
-        else:
-            _emit(basis.errors(degree))
-
-
-def _emit(row: dict) -> None:
-    print(json.dumps(row), flush=True)
+    section = _sections.load(request["section"])
+    for row in section.timings(request["cores"], request["rounds"], request["dtype"]):
+        cores = {"cores": request["cores"]} if len(section.cores) > 1 else {}
+        print(json.dumps(row | cores), flush=True)
 
 
 if __name__ == "__main__":

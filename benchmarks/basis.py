@@ -1,24 +1,41 @@
 """Values, gradients and reverse mode of the basis beside sphericart, e3nn and SciPy."""
 
 import functools
+import itertools
 from collections.abc import Iterator
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from matplotlib.figure import Figure
 
+from experiments.runner import Column
 from experiments.shared.timing import interleaved, ratio
 from jaxsh import harmonics
 
-from . import _peers
+from . import page
+from ._sections import Cores, Rows, Section
 
 # SciPy is measured where one call of it ends in a second or so, e3nn where it compiles in seconds.
 _SCIPY_COUNT, _E3NN_COUNT = 10_000, 10_000
 
 
-def timings(degree: int, count: int, dtype, rounds: int) -> Iterator[dict[str, Any]]:
+DEGREES, COUNTS = (3, 6, 10, 13), (10_000, 100_000)
+QUANTITIES = {"values": "#0072B2", "with gradient": "#D55E00", "reverse": "#009E73"}
+CORES = {"one": "one core", "all": "all cores"}
+
+
+def timings(cores: Cores, rounds: int, dtype: str) -> Iterator[dict[str, Any]]:
+    """Rows of each degree and number of directions."""
+    for degree, count in itertools.product(DEGREES, COUNTS):
+        yield from _timings(degree, count, np.dtype(dtype), rounds)
+
+
+def _timings(degree: int, count: int, dtype, rounds: int) -> Iterator[dict[str, Any]]:
     """One row per quantity. Ours is `axis=0`; peers have their own layout."""
+    from . import _peers
+
     generator = np.random.default_rng(0)
     vectors = generator.normal(size=(count, 3))
     vectors = jnp.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True), dtype)
@@ -69,29 +86,83 @@ def timings(degree: int, count: int, dtype, rounds: int) -> Iterator[dict[str, A
         }
 
 
-def errors(degree: int) -> dict[str, Any]:
-    """Largest float32 error over directions all around, dense near the poles, and along the axes,
-    against SciPy in float64."""
-    generator = np.random.default_rng(1)
-    around = generator.normal(size=(10_000, 3))
-    polar = generator.normal(size=(10_000, 3))
-    polar[:, :2] *= 10 ** generator.uniform(-3, 0, (10_000, 1))
-    vectors = np.concatenate([around, polar, np.eye(3), -np.eye(3)])
-    vectors = (vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)).astype(np.float32)
-    exact = _peers.scipy_values(vectors, degree)
-    rivals = {
-        "ours": harmonics.evaluate,
-        "sphericart": _peers.sphericart_values,
-        "e3nn": _peers.e3nn_values,
-    }
-    row: dict[str, Any] = {"degree": degree}
-    for name, values in rivals.items():
-        result = np.asarray(jax.jit(values, static_argnums=1)(vectors, degree))
-        row[name] = float(np.max(np.abs(result - exact)))
-    return row
-
-
 def _writer(rows: int):
     """The floor: write an output of this size once, with next to no arithmetic."""
     scale = np.linspace(0.5, 1.0, rows)[:, None]
     return lambda v: jnp.asarray(scale, v.dtype) * v[:, 0][None]
+
+
+def draw(figure: Figure, rows: Rows) -> None:
+    """Plot sphericart's time over ours by degree, for 10,000 directions."""
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    for axes, dtype in zip(panels, ("float32", "float64"), strict=True):
+        axes.axhspan(1, 8, color="#0072B2", alpha=0.06, lw=0)
+        axes.axhline(1, color="0.4", lw=1)
+        for quantity, color in QUANTITIES.items():
+            for cores, style in (("one", "-"), ("all", "--")):
+                wanted = {"dtype": dtype, "quantity": quantity, "cores": cores, "count": 10_000}
+                some = page.matching(rows, **wanted)
+                if some:
+                    points = [(row["degree"], row["sphericart"]) for row in some]
+                    label = f"{quantity}, {CORES[cores]}" if dtype == "float32" else None
+                    line = {"color": color, "marker": "o", "label": label}
+                    axes.plot(*zip(*points, strict=True), style, **line)
+        axes.set(title=f"{dtype}, 10,000 directions", xlabel="degree", yscale="log", ylim=(0.12, 6))
+        axes.set_xticks(sorted({row["degree"] for row in rows}))
+        axes.set_yticks([0.125, 0.25, 0.5, 1, 2, 4], ["⅛", "¼", "½", "1", "2×", "4×"])
+        axes.minorticks_off()
+        axes.grid(alpha=0.3)
+        axes.text(0.02, 0.97, "jaxsh is faster", transform=axes.transAxes, va="top")
+        axes.text(0.98, 0.03, "sphericart is faster", transform=axes.transAxes, ha="right")
+    panels[0].set_ylabel("time of sphericart over jaxsh's")
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
+
+
+def glance(rows: Rows) -> str:
+    """Sphericart's time over ours, a column for each degree."""
+    return "\n".join(
+        f"**{dtype}**\n\n{_by_degree(page.matching(rows, dtype=dtype))}"
+        for dtype in ("float32", "float64")
+    )
+
+
+def _by_degree(rows: Rows) -> str:
+    """A row for each quantity, number of directions and cores, a column for each degree."""
+    degrees = sorted({row["degree"] for row in rows})
+    counts = sorted({row["count"] for row in rows})
+    lines = []
+    for quantity, count, cores in itertools.product(QUANTITIES, counts, CORES):
+        some = page.matching(rows, quantity=quantity, count=count, cores=cores)
+        found = {row["degree"]: row["sphericart"] for row in some}
+        if found:
+            shown = [page.number(found.get(degree), 2) for degree in degrees]
+            lines.append([quantity, f"{count:,}", cores, *shown])
+    return page.table(
+        ["quantity", "directions", "cores", f"degree {degrees[0]}", *degrees[1:]], lines
+    )
+
+
+SECTION = Section(
+    name="basis",
+    title="The basis",
+    intro="Time of sphericart, whose kernels are in C++, over ours, on the same directions: values "
+    "alone, values with their gradients, and a gradient by reverse mode. Ours with `axis=0`.",
+    columns=[
+        Column("quantity", "quantity"),
+        Column("dtype", "dtype"),
+        Column("degree", "degree"),
+        Column("count", "N"),
+        Column("ours_ms", "ours, ms", digits=2),
+        Column("over_floor", "ours / write floor", digits=1),
+        Column("sphericart", "sphericart / ours", digits=2),
+        Column("solid", "its solid harmonics / ours", digits=2),
+        Column("e3nn", "e3nn / ours", digits=1),
+        Column("scipy", "SciPy / ours", digits=0),
+        Column("compile_s", "first call, s", digits=2),
+    ],
+    timings=timings,
+    draw=draw,
+    glance=glance,
+    dtypes=("float32", "float64"),
+    peers=("sphericart-jax", "e3nn-jax", "scipy"),
+)

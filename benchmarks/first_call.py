@@ -1,6 +1,5 @@
 """Seconds of a first call: trace, compile and run, for arrays of few rows."""
 
-import os
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -9,19 +8,23 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from experiments.runner import Column
 from jaxsh import geometry, harmonics, midrange, transfer
+
+from ._sections import Cores, Section
 
 # Small enough that compiling is all that counts.
 _ROWS = 2
 
 
-def timings(rounds: int) -> Iterator[dict[str, Any]]:
+def timings(cores: Cores, rounds: int, dtype: str) -> Iterator[dict[str, Any]]:
     """One row per call: medians over the rounds of the process's CPU time and of wall time.
 
     Each round starts with empty caches, and without the persistent one.
     """
     jax.config.update("jax_enable_compilation_cache", False)
     calls = _calls()
+    rounds = min(rounds, 3)
     for name, call in calls.items():
         jax.block_until_ready(call())  # what is made once per process: tables, imports
         cpu, wall = zip(*(_first(call) for _ in range(rounds)), strict=True)
@@ -61,8 +64,16 @@ def _calls() -> dict[str, Callable[[], Any]]:
     }
 
 
-if __name__ == "__main__":
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, [min(os.sched_getaffinity(0))])
-    for row in timings(3):
-        print(f"{row['call']:45s} {row['cpu_s']:.2f} s of CPU, {row['wall_s']:.2f} s of wall time")
+SECTION = Section(
+    name="first_call",
+    title="First calls",
+    intro="Seconds to trace, compile and run, for two rows, on one core.",
+    columns=[
+        Column("call", "call"),
+        Column("cpu_s", "CPU, s", digits=2),
+        Column("wall_s", "wall, s", digits=2),
+    ],
+    timings=timings,
+    cores=("one",),
+    keeps_memory=False,
+)

@@ -1,20 +1,29 @@
 """A lat-long picture to coefficients and back, beside evaluate-everything-and-multiply."""
 
 import functools
+from collections.abc import Iterator
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.runner import Column
 from experiments.shared.timing import interleaved, ratio
 from jaxsh import sphere
 
-from . import _peers
+from ._sections import Cores, Section
 
 
-def timings(degree: int, height: int, rounds: int) -> list[dict[str, Any]]:
+def timings(cores: Cores, rounds: int, dtype: str) -> Iterator[dict[str, Any]]:
+    """Rows of one picture and degree."""
+    yield from _timings(10, 256, rounds)
+
+
+def _timings(degree: int, height: int, rounds: int) -> list[dict[str, Any]]:
     """Projection and reconstruction of an RGB picture, float32."""
+    from . import _peers
+
     width = 2 * height
     image = jnp.asarray(np.random.default_rng(0).random((height, width, 3)), jnp.float32)
     quadrature = sphere.lat_long(height, width)
@@ -58,3 +67,21 @@ def timings(degree: int, height: int, rounds: int) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+SECTION = Section(
+    name="lat_long",
+    title="Lat-long pictures",
+    intro="To coefficients and back, float32, by separable sums; the others in times of these.",
+    columns=[
+        Column("quantity", "quantity"),
+        Column("picture", "picture"),
+        Column("degree", "degree"),
+        Column("ours_ms", "separable, ms", digits=2),
+        Column("streamed", "streamed / separable", digits=1),
+        Column("sphericart", "sphericart + matmul / separable", digits=1),
+        Column("compile_s", "first call, s", digits=2),
+    ],
+    timings=timings,
+    peers=("sphericart-jax",),
+)
