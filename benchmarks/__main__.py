@@ -34,7 +34,7 @@ class Options:
     cores: tuple[_sections.Cores, ...] = ("one", "all")
     """one: pinned to a core; all: free to use every one; wall clock in both"""
     allocator: Literal["keeping", "default"] = "keeping"
-    """keeping: freed pages stay with the process, where a section asks for it; default: as glibc does"""
+    """keeping: freed pages stay with the process, where a section has it so; default: as glibc"""
     rounds: int = 9
     """interleaved rounds per row"""
     out: Path = Path("results/benchmarks")
