@@ -279,6 +279,8 @@ def align(*arrays: Array) -> tuple[Array, ...]:
 
 def check_batches(**shapes: tuple[int, ...]) -> None:
     """Raises `ValueError` unless the leading axes of all arrays, named for the user, broadcast."""
+    if sum(len(shape) > 1 for shape in shapes.values()) < 2:
+        return
     try:
         np.broadcast_shapes(*(shape[:-1] for shape in shapes.values()))
     except ValueError:

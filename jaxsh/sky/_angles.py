@@ -9,9 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_finite, as_float, check_vectors
+from .._core.checks import align, as_finite, as_float, check_finite, check_vectors
 from .._core.xla import in_blocks, keep_batch, on_mesh
 from ..harmonics import degrees, orders
+from ._polynomials import circular
 
 
 class Angles(NamedTuple):
@@ -49,6 +50,19 @@ def directions(value: Float[ArrayLike, "*batch 3"], name: str) -> Float[Array, "
 def parameter(value: Float[ArrayLike, "*batch"], dtype, name: str) -> Float[Array, "*batch"]:
     """Converts a model's number, one per sun, to the directions' dtype."""
     return as_float(value, name).astype(dtype)
+
+
+def kept(value: Float[ArrayLike, "..."], name: str) -> Float[Array | np.ndarray, "..."]:
+    """Converts as `as_finite` does, but leaves on the host what is there.
+
+    A jitted function takes NumPy's arrays as they are, faster than they are put on a device before.
+    """
+    if isinstance(value, np.ndarray | np.floating | float):
+        array = np.asarray(value)
+        if array.dtype.kind == "f":
+            check_finite(name, array)
+            return array.astype(jax.dtypes.canonicalize_dtype(array.dtype), copy=False)
+    return as_finite(value, name)
 
 
 def each_sun(
@@ -147,13 +161,7 @@ def waves(
         aside = radius > 0
         safe = jnp.where(aside, radius, 1)
         x, y = jnp.where(aside, x / safe, 1), y / safe
-    rows = [(jnp.ones_like(x), jnp.zeros_like(x))]
-    for _ in range(degree):
-        real, imaginary = rows[-1]
-        rows.append((real * x - imaginary * y, real * y + imaginary * x))
-    sines = [imaginary for _, imaginary in rows[:0:-1]]
-    table = jnp.stack(sines + [real for real, _ in rows])
-    return table[orders(degree) + degree]
+    return circular(x, y, degree)[orders(degree) + degree]
 
 
 def half_rows(degree: int) -> np.ndarray:

@@ -10,10 +10,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import check_batches, check_choice, check_degree, check_options, check_type
+from .._core.checks import (
+    check_batches,
+    check_choice,
+    check_degree,
+    check_options,
+    check_type,
+    check_vectors,
+)
 from .._core.host import read_only_cache
 from ..harmonics import window as harmonics_window
-from ._angles import directions, parameter, zenith_angle
+from ._angles import kept, zenith_angle
 from ._color import xyz_to_srgb
 from ._error import smallest_luminance
 from ._fit import OPTIONS, fit
@@ -81,8 +88,9 @@ def preetham_harmonics(
     >>> sky.preetham_harmonics(sun, 3.0, degree=4, window="habel").shape
     (2, 3, 25)
     """
-    sun = directions(sun, "sun")
-    turbidity = parameter(turbidity, sun.dtype, "turbidity")
+    sun = kept(sun, "sun")
+    check_vectors("sun", sun)
+    turbidity = kept(turbidity, "turbidity").astype(sun.dtype)
     if table is None:
         table = "precise" if sun.dtype == jnp.float64 else "small"
     if window is not None:
@@ -125,7 +133,12 @@ def preetham_table(table: Table, degree: int = 6) -> SkyFit:
 
 def stored_axes(table: Table) -> tuple[Axis, ...]:
     check_choice("table", table, get_args(Table))
-    return preetham_axes(*_stored()[table][1])
+    return _axes()[table]
+
+
+@functools.cache
+def _axes() -> dict[str, tuple[Axis, ...]]:
+    return {table: preetham_axes(*turbidity) for table, (_, turbidity) in _stored().items()}
 
 
 @read_only_cache(maxsize=None)
@@ -145,16 +158,22 @@ def prefactor(sun: Float[Array, "n 3"], turbidity: Float[Array, " n"]) -> Float[
     zenith, and nearly vanishes at τ ≈ 2, where the rest does not.
     """
     theta, cos_theta, table = zenith_angle(*sun.T), sun[:, 2], preetham_constants("paper")
-
-    def over_gradation(zenith, coefficients):
-        a, b, c, d, e = (slope * turbidity + intercept for slope, intercept in coefficients)
-        return zenith / (
-            gradation(a, b, jnp.ones_like(theta)) * indicatrix(c, d, e, theta, cos_theta)
-        )
-
-    luminance = over_gradation(zenith_luminance(theta, turbidity), table.luminance)
-    x = over_gradation(zenith_value(table.zenith_x, theta, turbidity), table.x)
-    y = over_gradation(zenith_value(table.zenith_y, theta, turbidity), table.y)
+    # The quantities Y, x and y as rows, so that each function below is one call for all three.
+    lines = np.array([table.luminance, table.x, table.y], sun.dtype).T[..., None]
+    a, b, c, d, e = (
+        slope * turbidity[None] + intercept for slope, intercept in zip(*lines, strict=True)
+    )
+    zenith = jnp.stack(
+        [
+            zenith_luminance(theta, turbidity),
+            zenith_value(table.zenith_x, theta, turbidity),
+            zenith_value(table.zenith_y, theta, turbidity),
+        ]
+    )
+    seen = gradation(a, b, jnp.ones_like(theta)[None]) * indicatrix(
+        c, d, e, theta[None], cos_theta[None]
+    )
+    luminance, x, y = zenith / seen
     return jnp.stack([luminance * x / y, luminance, luminance / y], axis=-1)
 
 

@@ -11,18 +11,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import check_batches, check_degree, is_concrete
+from .._core.checks import check_batches, check_degree, check_vectors, is_concrete
 from .._core.linalg import einsum, matmul
 from ._angles import (
-    directions,
+    kept,
     over_one_axis,
-    parameter,
     row_of_each,
     squared_zenith_angle,
     unit,
     waves,
     zenith_angle,
 )
+from ._polynomials import FEW, chebyshev
 
 Prefactor = Callable[..., Array]
 
@@ -108,12 +108,13 @@ class SkyFit(eqx.Module):
         Outside of the fitted range: a `ValueError` where values are known, else NaN. Nothing is
         extrapolated.
         """
-        sun = directions(sun, "sun")
+        sun = kept(sun, "sun")
+        check_vectors("sun", sun)
         if len(parameters) != len(self.axes) - 1:
             names = ", ".join(axis.name for axis in self.axes[1:]) or "none"
             raise ValueError(f"expected as parameters {names}, got {len(parameters)}")
         numbers = tuple(
-            parameter(value, sun.dtype, axis.name)
+            kept(value, axis.name).astype(sun.dtype)
             for axis, value in zip(self.axes[1:], parameters, strict=True)
         )
         shapes = {
@@ -140,24 +141,30 @@ class SkyFit(eqx.Module):
 def check_range(axes: tuple[Axis, ...], parity: bool, sun, numbers) -> None:
     """Raises `ValueError` for known values outside of the range that a fit holds in."""
     if is_concrete(sun):
-        x, y, z = np.moveaxis(np.asarray(sun, np.float64), -1, 0)
-        theta = np.arctan2(np.hypot(x, y), z)
-        bad = ~axes[0].holds(theta**2 if parity else theta)
-        if bad.any():
+        theta = _zenith_angles(np.asarray(sun, np.float64))
+        inside = axes[0].holds(theta * theta if parity else theta)
+        if inside is not True and not np.all(inside):
             high = np.sqrt(axes[0].high) if parity else axes[0].high
             raise ValueError(
                 f"fitted for suns up to {np.degrees(high):g} degrees from the zenith, got "
-                f"{np.degrees(theta[bad].flat[0]):g}"
+                f"{np.degrees(np.asarray(theta)[~np.asarray(inside)].flat[0]):g}"
             )
     for axis, value in zip(axes[1:], numbers, strict=True):
         if is_concrete(value):
             array = np.asarray(value)
-            bad = ~axis.holds(array)
-            if bad.any():
+            inside = axis.holds(array if array.ndim else array.item())
+            if inside is not True and not np.all(inside):
                 raise ValueError(
                     f"fitted for {axis.name} in [{axis.low:g}, {axis.high:g}], got "
-                    f"{array[bad].flat[0]:g}"
+                    f"{array[~np.asarray(inside)].flat[0]:g}"
                 )
+
+
+def _zenith_angles(suns: Float[np.ndarray, "*suns 3"]) -> Float[np.ndarray, "*suns"] | float:
+    if suns.ndim == 1:  # Python's own functions are faster for one
+        x, y, z = suns.tolist()
+        return math.atan2(math.hypot(x, y), z)
+    return np.arctan2(np.hypot(suns[..., 0], suns[..., 1]), suns[..., 2])
 
 
 @jax.jit
@@ -176,11 +183,19 @@ def _evaluate(fit: SkyFit, suns: Float[Array, "n 3"], *numbers: Float[Array, " n
     values = matmul(series, basis).reshape(channels, rows, len(x))
     if fit.prefactor is not None:
         values = values * fit.prefactor(suns, *numbers).T[:, None]
-    values = einsum("oc,crn->orn", fit.mix.astype(suns.dtype), values)
+    values = _mixed(fit.mix.astype(suns.dtype), values)
     turned = values[:, row_of_each(fit.degree)] * waves(x, y, fit.degree, smooth=fit.parity)[None]
     inside = jnp.stack([axis.holds(v) for axis, v in zip(fit.axes, variables, strict=True)])
     turned = jnp.where(inside.all(axis=0)[None, None], turned, jnp.nan)
     return jnp.moveaxis(turned, -1, 0)
+
+
+def _mixed(mix: Float[Array, "out c"], values: Float[Array, "c r n"]) -> Float[Array, "out r n"]:
+    if values.shape[-1] > FEW:
+        return einsum("oc,crn->orn", mix, values)
+    # A part of the kernel that takes it, where a product would be one of its own.
+    mix = mix[..., None, None]
+    return functools.reduce(jnp.add, (mix[:, i] * values[i][None] for i in range(len(values))))
 
 
 def design(axes, variables, terms) -> Float[Array, "terms n"]:
@@ -191,14 +206,6 @@ def design(axes, variables, terms) -> Float[Array, "terms n"]:
             for axis, value, count in zip(axes, variables, terms, strict=True)
         ]
     )
-
-
-def chebyshev(x: Float[Array, " n"], count: int) -> Float[Array, "count n"]:
-    """Chebyshev's T_0 to T_(count-1) in rows, by the three-term recursion. Differentiable."""
-    rows = [jnp.ones_like(x), x]
-    while len(rows) < count:
-        rows.append(2 * x * rows[-1] - rows[-2])
-    return jnp.stack(rows[:count])
 
 
 def monomials(x: Float[Array, " n"], count: int) -> Float[Array, "count n"]:

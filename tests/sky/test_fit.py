@@ -9,7 +9,7 @@ import pytest
 from suns import sun_at, upper_directions
 
 from jaxsh import harmonics, sky
-from jaxsh.sky import _fit, _sky_fit
+from jaxsh.sky import _fit, _polynomials, _sky_fit
 
 DEGREE = 3
 OPTIONS = {"degree": DEGREE, "terms": (7, 3), "log": ["haze"]}
@@ -268,14 +268,16 @@ def test_bad_calls(fitted, unchecked):
 
 def test_the_basis():
     x = np.linspace(-1, 1, 9)
-    rows = _sky_fit.chebyshev(jnp.asarray(x), 6)
-    np.testing.assert_allclose(rows, np.polynomial.chebyshev.chebvander(x, 5).T, 0, 1e-15)
-    assert _sky_fit.chebyshev(jnp.asarray(x), 1).shape == (1, 9)
+    exact = np.polynomial.chebyshev.chebvander(x, 5).T
+    for times in (1, 10):  # as products, and by recursion: 1.1e-15 and 4e-16 off
+        rows = _polynomials.chebyshev(jnp.tile(x, times), 6)
+        np.testing.assert_allclose(rows, np.tile(exact, times), 0, 2e-15)
+    assert _polynomials.chebyshev(jnp.asarray(x), 1).shape == (1, 9)
     np.testing.assert_allclose(_sky_fit.monomials(jnp.asarray(x), 4), np.vander(x, 4).T[::-1])
     axis = sky.Axis("haze", 1.0, 3.0, log=True)
     nodes = axis.nodes(5)
     np.testing.assert_allclose(
-        _sky_fit.chebyshev(axis.scaled(jnp.asarray(nodes)), 6)[5], 0, 0, 1e-14
+        _polynomials.chebyshev(axis.scaled(jnp.asarray(nodes)), 6)[5], 0, 0, 1e-14
     )
     assert (np.diff(nodes) > 0).all()
 
@@ -292,3 +294,13 @@ def test_why_chebyshev():
     good = _fit.design((height, turbidity), (theta, tau), (14, 8))
     assert np.linalg.cond(raw.T) > 1e15
     assert np.linalg.cond(good.T) < 2.1
+
+
+@pytest.mark.parametrize("count", [3, 40])  # as products, and by recursion
+def test_circular_rows_are_powers_of_a_complex_number(count):
+    random = np.random.default_rng(0)
+    x, y = random.uniform(-1, 1, (2, count))
+    powers = (x + 1j * y) ** np.arange(7)[:, None]
+    exact = np.concatenate([powers.imag[:0:-1], powers.real])
+    rows = _polynomials.circular(jnp.asarray(x), jnp.asarray(y), 6)
+    np.testing.assert_allclose(rows, exact, 0, 1e-14)
