@@ -123,7 +123,17 @@ def _dataset(config: Dataset, context: Context) -> Table:
                 for name in ("day", "latitude", "longitude", "turbidity", "ground")
             }
             chosen += lights.of_day(config.suns, config.degree, **day)
-    writing.claim(folder, _about(config, mesh, environments, chosen, context.seed))
+    with writing.claimed(folder, _about(config, mesh, environments, chosen, context.seed)):
+        return _make(config, context, folder, mesh, chosen)
+
+
+def _make(
+    config: Dataset,
+    context: Context,
+    folder: Path,
+    mesh: geometry.Mesh,
+    chosen: list[lights.Light],
+) -> Table:
     with context.time("bake"):
         baked, bounced = _bake(config, mesh, folder, context.seed)
     cameras = views.around(

@@ -15,6 +15,11 @@ from jaxsh import imaging
 
 from ..runner import UserError
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
+
 ABOUT = "dataset.json"
 # Pictures that wait to be written, for each thread.
 _WAITING = 4
@@ -39,10 +44,12 @@ def words(path: Path, content: Any) -> None:
     part.replace(path)
 
 
-def claim(folder: Path, about: dict[str, Any]) -> None:
-    """Take a folder for a dataset: a new one, or one of the same settings that a run has left.
+@contextlib.contextmanager
+def claimed(folder: Path, about: dict[str, Any]) -> Iterator[None]:
+    """Hold a folder for a dataset: a new one, or one of the same settings that a run has left.
 
-    Raises `UserError` for anything else, which stays as it is.
+    Raises `UserError` for anything else, which stays as it is, and where another run holds it
+    (where the system has locks of files that end with the process, as all but Windows have).
     """
     path = folder / ABOUT
     if not path.exists():
@@ -51,11 +58,25 @@ def claim(folder: Path, about: dict[str, Any]) -> None:
         if folder.exists() and any(".part" not in entry.name for entry in folder.iterdir()):
             raise UserError(f"{str(folder)!r} holds no dataset: move it or choose --folder")
         words(path, about)
-        return
+    with open(path, encoding="utf-8") as file:
+        if fcntl:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                busy = f"another run is making {str(folder)!r}: wait for it or choose --folder"
+                raise UserError(busy) from error
+        _check_same(folder, file.read(), about)
+        for part in folder.rglob("*.part*"):  # of a run that was killed
+            part.unlink(missing_ok=True)
+        yield
+
+
+def _check_same(folder: Path, text: str, about: dict[str, Any]) -> None:
+    """Raises `UserError` unless a folder's dataset is of these settings."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(text)
     except ValueError as error:
-        raise UserError(f"{path}: no JSON ({error})") from error
+        raise UserError(f"{folder / ABOUT}: no JSON ({error})") from error
     found, wanted = _flat(found), _flat(json.loads(json.dumps(about)))
     other = [key for key in wanted if found.get(key) != wanted[key]]
     if other or len(found) != len(wanted):
@@ -63,8 +84,6 @@ def claim(folder: Path, about: dict[str, Any]) -> None:
             f"{str(folder)!r} holds a dataset of other settings ({', '.join(other)}): choose "
             "--folder, or move it"
         )
-    for part in folder.rglob("*.part*"):  # of a run that was killed
-        part.unlink(missing_ok=True)
 
 
 def _flat(about: Any) -> dict[str, Any]:

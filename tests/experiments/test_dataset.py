@@ -54,28 +54,46 @@ def test_cameras_around():
     assert centers[0][1] == pytest.approx(-lengths[0], rel=1e-6)
 
 
+def take(folder, about):
+    with writing.claimed(folder, about):
+        pass
+
+
 def test_folders(tmp_path):
     folder = tmp_path / "new"
     about = {"settings": {"views": 2, "mesh": "a.glb"}, "digests": {"mesh": "a"}}
     folder.mkdir()
     (folder / "dataset.json.7.part").touch()  # of a run that was killed at its start
-    writing.claim(folder, about)
+    take(folder, about)
     (folder / "images").mkdir()
     part = folder / "images" / "0000.7.part.png"
     part.touch()
-    writing.claim(folder, about)
+    take(folder, about)
     assert not part.exists()
     before = (folder / writing.ABOUT).read_bytes()
     with pytest.raises(UserError, match=r"other settings \(what mesh holds\): choose --folder"):
-        writing.claim(folder, about | {"digests": {"mesh": "b"}})
+        take(folder, about | {"digests": {"mesh": "b"}})
     with pytest.raises(UserError, match=r"other settings \(views\): choose --folder"):
-        writing.claim(folder, about | {"settings": {"views": 3, "mesh": "a.glb"}})
+        take(folder, about | {"settings": {"views": 3, "mesh": "a.glb"}})
     assert (folder / writing.ABOUT).read_bytes() == before
     (tmp_path / "file").touch()
     with pytest.raises(UserError, match="holds no dataset"):
-        writing.claim(tmp_path, about)
+        take(tmp_path, about)
     with pytest.raises(UserError, match="is a file: choose another --folder"):
-        writing.claim(tmp_path / "file", about)
+        take(tmp_path / "file", about)
+
+
+def test_one_run_at_a_time_in_a_folder(tmp_path):
+    pytest.importorskip("fcntl")
+    about = {"settings": {"views": 2}}
+    with writing.claimed(tmp_path / "new", about):
+        part = tmp_path / "new" / "0000.7.part.png"
+        part.touch()  # of the run that goes on
+        with pytest.raises(UserError, match="another run is making .*new': wait for it"):
+            take(tmp_path / "new", about)
+        assert part.exists()
+    take(tmp_path / "new", about)
+    assert not part.exists()
 
 
 @pytest.mark.parametrize(
