@@ -89,7 +89,7 @@ def test_one_run_at_a_time_in_a_folder(tmp_path):
     with writing.claimed(tmp_path / "new", about):
         part = tmp_path / "new" / "0000.7.part.png"
         part.touch()  # of the run that goes on
-        with pytest.raises(UserError, match="another run is making .*new': wait for it"):
+        with pytest.raises(UserError, match=r"another run is making .*new': wait for it"):
             take(tmp_path / "new", about)
         assert part.exists()
     take(tmp_path / "new", about)
