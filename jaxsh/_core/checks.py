@@ -14,6 +14,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
+from .host import put
 from .words import article, described, nearest, said_dtype
 
 # A light, an eye, a few thousand albedos: looking at more would take time of every call.
@@ -33,19 +34,21 @@ def as_float(value: Any, name: str = "") -> Float[Array, "..."]:
     # What is a JAX array already is looked at in every frame.
     array = value if isinstance(value, Array) else _as_array(value, name)
     if jnp.issubdtype(array.dtype, jnp.floating):
-        return array
+        return array if isinstance(array, Array) else put(array)
     if not jnp.issubdtype(array.dtype, jnp.integer):
         raise ValueError(f"expected real numbers{_for(name)}, got dtype {array.dtype}")
     if array.dtype.itemsize < 4:
         raise ValueError(f"expected real numbers{_for(name)}, got dtype {said_dtype(array.dtype)}")
-    return array.astype(jnp.result_type(float))
+    if isinstance(array, Array):
+        return array.astype(jnp.result_type(float))
+    return put(array, jnp.result_type(float))
 
 
 def as_integer(value: Any, name: str) -> Int[Array, "..."]:
     """Convert to an array of integers; raises `ValueError` for anything else."""
     array = value if isinstance(value, Array) else _as_array(value, name)
     if jnp.issubdtype(array.dtype, jnp.integer):
-        return array
+        return array if isinstance(array, Array) else put(array)
     raise ValueError(f"expected integers for {name}, got dtype {array.dtype}")
 
 
@@ -160,9 +163,40 @@ def at_hand(array: Array) -> bool:
     return is_concrete(array) and next(iter(array.devices())).platform == "cpu"
 
 
-def _as_array(value: Any, name: str) -> Array:
+def on_host(value: Any) -> np.ndarray | None:
+    """The plain numbers of a NumPy array, or of a list or tuple of Python's, else None.
+
+    Those may be checked where they are, and copied to a device by `put`.
+    """
+    if isinstance(value, list | tuple):
+        if not all(type(leaf) in (int, float) for leaf in jax.tree.leaves(value)):
+            return None
+        value = np.asarray(value)  # raises `ValueError` for lists of several lengths
+    elif type(value) is not np.ndarray:
+        return None
+    plain = value.dtype.kind in "fiu" and value.dtype.itemsize <= 8 and value.dtype.isnative
+    return value if plain else None
+
+
+def host_known(*arrays: Array | np.ndarray | None) -> bool:
+    """True where what little is to be computed of arrays may be in NumPy, without a program.
+
+    That is of known values of NumPy's own types, on one CPU device; None counts as one.
+    """
+    return all(
+        array is None
+        or (
+            array.dtype in (jnp.float32, jnp.float64, jnp.int32, bool)
+            and (isinstance(array, np.ndarray) or (at_hand(array) and len(array.devices()) == 1))
+        )
+        for array in arrays
+    )
+
+
+def _as_array(value: Any, name: str) -> Array | np.ndarray:
     try:
-        return jnp.asarray(value)
+        plain = on_host(value)
+        return jnp.asarray(value) if plain is None else plain
     except (TypeError, ValueError) as error:
         if isinstance(error, jax.errors.JAXTypeError):  # of tracing
             raise

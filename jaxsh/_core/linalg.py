@@ -16,6 +16,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 _FULL = jax.lax.Precision.HIGHEST
+_FEW = 5
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -84,13 +85,13 @@ def shading_tall_product(
     def plain(tall, rows):
         return shading_matmul(tall, rows.T)
 
-    # XLA's CPU kernel is faster with whole eights of rows. A GPU would write them all, and read
-    # them again.
+    # XLA's CPU kernel is faster with whole eights of rows, but for a few, as of one light. A GPU
+    # would write them all, and read them again.
     def filled(tall, rows):
         return plain(tall, jnp.pad(rows, ((0, missing), (0, 0))))[:, : len(rows)]
 
     missing = -len(rows) % 8
-    if not missing:
+    if not missing or len(rows) < _FEW:
         return plain(tall, rows)
     return jax.lax.platform_dependent(tall, rows, cpu=filled, default=plain)
 

@@ -11,7 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .checks import at_hand, check_finite, said_dtype
+from .checks import at_hand, check_finite, on_host, said_dtype
+from .host import put
 
 # What stands beyond the edges of a texture.
 Wrap = Literal["repeat", "clamp", "mirror"]
@@ -25,7 +26,8 @@ def as_radiance(name: str, value: Any) -> Float[Array, "..."]:
     array = value
     if not isinstance(value, Array):
         try:
-            array = jnp.asarray(value)
+            plain = on_host(value)
+            array = jnp.asarray(value) if plain is None else plain
         except (TypeError, ValueError) as error:
             if isinstance(error, jax.errors.JAXTypeError):  # of tracing
                 raise
@@ -33,7 +35,7 @@ def as_radiance(name: str, value: Any) -> Float[Array, "..."]:
             raise ValueError(f"expected {name} as an array of floats, got {kind}") from None
     if not jnp.issubdtype(array.dtype, jnp.floating):
         raise ValueError(f"expected {name} in floats, got {said_dtype(array.dtype)}")
-    return array
+    return array if isinstance(array, Array) else put(array)
 
 
 def as_picture(name: str, value: Any, *, lat_long: bool = False) -> Float[Array, "h w c"]:

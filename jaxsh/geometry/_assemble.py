@@ -5,17 +5,17 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import Literal
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
 from .._core import srgb
 from .._core.checks import described
+from .._core.host import put
 from .._core.words import reason
 from ._clean import Clean, clean
 from ._files._polygons import Polygons, unit
 from ._files._triangulate import triangulate
-from ._mesh import Mesh, vertex_normals
+from ._mesh import Mesh, host_normals
 from ._split import smooth_groups, split
 
 # A point given by the caller, and what decides over normals.
@@ -109,20 +109,20 @@ def assemble(
 
     material = None
     if polygons.polygon_material is not None and polygons.materials:
-        material = jnp.asarray(polygons.polygon_material[owner[whole.rows]], jnp.int32)
+        material = put(polygons.polygon_material[owner[whole.rows]], np.int32)
     if at_knots is None or attributes or knots is not whole.faces:
         corner, faces = split(whole.faces, knots, raw, attributes)
         vertices = whole.vertices[whole.faces.ravel()[corner]]
         given = np.asarray(at_knots)[knots] if vectors is None else vectors
-        normal = jnp.asarray(given.reshape(-1, 3)[corner])
+        normal = given.reshape(-1, 3)[corner]
     else:
         corner, faces, vertices, normal = slice(0), whole.faces, whole.vertices, at_knots
     return Mesh(
-        jnp.asarray(vertices),
-        jnp.asarray(faces),
-        normal,
-        uv=None if uv is None else jnp.asarray(uv.reshape(-1, 2)[corner]),
-        colors=None if colors is None else jnp.asarray(colors.reshape(-1, 4)[corner]),
+        put(vertices),
+        put(faces),
+        put(normal),
+        uv=None if uv is None else put(uv.reshape(-1, 2)[corner]),
+        colors=None if colors is None else put(colors.reshape(-1, 4)[corner]),
         face_material=material,
         materials=polygons.materials,
         origin=(float(center[0]), float(center[1]), float(center[2])),
@@ -151,7 +151,7 @@ def _knots(whole: Clean, normals: Normals):
     exponent = np.frexp(np.abs(vertices).max())[1]
     if exponent < -60:
         vertices = np.ldexp(vertices, -exponent)
-    return knots, vertex_normals(jnp.asarray(vertices), jnp.asarray(knots))
+    return knots, host_normals(vertices, knots)
 
 
 def _in_blocks(
@@ -180,7 +180,7 @@ def _from_file(given: np.ndarray, slots: np.ndarray, whole: Clean) -> tuple[np.n
             (missing, "corners without a normal given a smooth one"),
         ]
         knots, smooth = _knots(whole, "smooth")
-        vectors = np.where(good[..., None], vectors, np.asarray(smooth)[knots])
+        vectors = np.where(good[..., None], vectors, smooth[knots])
     behind = 0
     for start in range(0, len(slots), _BLOCK):
         block = slice(start, start + _BLOCK)

@@ -13,6 +13,9 @@ from .._core.checks import as_float, as_integer, described
 from .._core.xla import keep_rows, rows_are_split
 from ._base_color import BaseColor
 
+# Faces whose vectors stay in cache.
+_BLOCK = 16_384
+
 
 class Mesh(eqx.Module):
     """Holds a triangle mesh: positions, faces (counter-clockwise seen from outside), unit normals.
@@ -106,28 +109,53 @@ def vertex_normals(vertices: Float[Array, "v 3"], faces: Int[Array, "f 3"]) -> F
 def _vertex_normals(vertices, faces):
     # Neither factor changes a direction: without them large or tiny meshes leave float32's range.
     points = vertices / _largest(vertices)
-    corners = points[faces]
-    edges = jnp.roll(corners, -1, axis=1) - corners
-    edges = edges / _largest(edges, axis=(1, 2))
-    across = jnp.cross(edges[:, :1], edges[:, 1:2])
-    squared = jnp.sum(across * across, axis=-1, keepdims=True)
-    has_area = squared > 0
-    twice_area = jnp.sqrt(jnp.where(has_area, squared, 1))
-    cosines = -jnp.sum(edges * jnp.roll(edges, 1, axis=1), axis=-1, keepdims=True)
-    # Sine and cosine, both times the lengths of the two edges.
-    angles = jnp.arctan2(twice_area, jnp.where(has_area, cosines, 1))
-    parts = jnp.where(has_area, angles * (across / twice_area), 0)
     # Zeros that are sharded as the points are: under `vmap` JAX >= 0.12 asks for that.
     zeros = jnp.where(jnp.zeros_like(points, dtype=bool), points, jnp.zeros_like(points))
-    sums = zeros.at[faces].add(parts)
+    return _directions(zeros.at[faces].add(_shares(points[faces])))
+
+
+def host_normals(
+    vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"]
+) -> Float[np.ndarray, "v 3"]:
+    """`vertex_normals` on the host, without a program to compile: a block of faces at a time."""
+    points = vertices / _largest(vertices)
+    sums = np.zeros((3, len(points)))
+    for start in range(0, len(faces), _BLOCK):
+        block = faces[start : start + _BLOCK]
+        shares = _shares(points[block])
+        for total, column in zip(sums, np.moveaxis(shares, -1, 0), strict=True):
+            total += np.bincount(block.ravel(), column.ravel(), len(total))
+    return _directions(np.ascontiguousarray(sums.T.astype(points.dtype)))
+
+
+def _shares(corners: Any) -> Any:
+    """Compute a face's normal times its angle at each of its corners, (..., 3, 3)."""
+    numpy = np if isinstance(corners, np.ndarray) else jnp
+    edges = numpy.roll(corners, -1, axis=1) - corners
+    edges = edges / _largest(edges, axis=(1, 2))
+    across = numpy.cross(edges[:, :1], edges[:, 1:2])
+    squared = numpy.sum(across * across, axis=-1, keepdims=True)
+    has_area = squared > 0
+    twice_area = numpy.sqrt(numpy.where(has_area, squared, 1))
+    cosines = -numpy.sum(edges * numpy.roll(edges, 1, axis=1), axis=-1, keepdims=True)
+    # Sine and cosine, both times the lengths of the two edges.
+    angles = numpy.arctan2(twice_area, numpy.where(has_area, cosines, 1))
+    return numpy.where(has_area, angles * (across / twice_area), 0)
+
+
+def _directions(sums: Any) -> Any:
+    """Make vectors (v, 3) of unit length; +z where they are zero."""
+    numpy = np if isinstance(sums, np.ndarray) else jnp
     sums = sums / _largest(sums, axis=-1)
-    squared = jnp.sum(sums * sums, axis=-1, keepdims=True)
+    squared = numpy.sum(sums * sums, axis=-1, keepdims=True)
     has_normal = squared > 0
-    unit = sums * lax.rsqrt(jnp.where(has_normal, squared, 1))
-    return jnp.where(has_normal, unit, jnp.zeros_like(unit).at[:, 2].set(1))
+    unit = sums / numpy.sqrt(numpy.where(has_normal, squared, 1))
+    return numpy.where(has_normal, unit, numpy.asarray([[0, 0, 1]], unit.dtype))
 
 
-def _largest(x: Array, axis: int | tuple[int, ...] | None = None) -> Array:
+def _largest(x: Any, axis: int | tuple[int, ...] | None = None) -> Any:
     """Take the largest magnitude, as a constant to divide by; 1 where everything is zero."""
-    largest = lax.stop_gradient(jnp.max(jnp.abs(x), axis=axis, keepdims=True, initial=0))
-    return jnp.where(largest > 0, largest, 1)
+    numpy = np if isinstance(x, np.ndarray) else jnp
+    largest = numpy.max(numpy.abs(x), axis=axis, keepdims=True, initial=0)
+    largest = largest if isinstance(x, np.ndarray) else lax.stop_gradient(largest)
+    return numpy.where(largest > 0, largest, numpy.ones_like(largest))

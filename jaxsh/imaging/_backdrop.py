@@ -2,15 +2,15 @@
 
 import functools
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._core.checks import check_type
+from .._core.checks import check_type, host_known, is_concrete
+from .._core.host import put
 from .._core.pictures import as_picture, as_radiance, check_values
 from .._core.xla import keep_rows, rounded_once
-from ._camera import Camera
+from ._camera import Camera, host_rays
 
 
 def look_up(
@@ -63,12 +63,11 @@ def backdrop(environment: Float[Array, "height width c"], camera: Camera) -> Flo
     check_type("camera", camera, Camera)
     environment = as_picture("environment", environment, lat_long=True)
     check_values("environment", environment)
-    return _backdrop(environment, camera)
-
-
-@eqx.filter_jit
-def _backdrop(environment, camera: Camera):
-    _, directions = camera.rays()
+    known = host_known(environment, camera.position, camera.target, camera.up)
+    if known and is_concrete(camera.fov_y):  # a program less to compile
+        directions = put(host_rays(camera)[1])
+    else:
+        _, directions = camera.rays()
     return look_up(environment, directions.reshape(camera.height, camera.width, 3))
 
 
@@ -76,21 +75,21 @@ def _backdrop(environment, camera: Camera):
 def _look_up(environment, directions):
     height, width, _ = environment.shape
     row, column = rounded_once(functools.partial(_place, height, width), directions)
-    # Beyond the edge so much that half-way, on the pole, all columns meet in their mean.
-    top, bottom = (
-        2 * jnp.mean(edge, axis=1, keepdims=True) - edge
-        for edge in (environment[:1], environment[-1:])
-    )
-    padded = jnp.concatenate([top, environment, bottom])
     i, j = jnp.floor(row), jnp.floor(column)
     down = (row - i).astype(environment.dtype)[..., None]
     right = (column - j).astype(environment.dtype)[..., None]
     i = jnp.clip(i.astype(jnp.int32), -1, height - 1)
     left = j.astype(jnp.int32) % width
     upper, lower = (
-        padded[k, left] * (1 - right) + padded[k, (left + 1) % width] * right
-        for k in (i + 1, i + 2)
+        environment[k, left] * (1 - right) + environment[k, (left + 1) % width] * right
+        for k in (jnp.maximum(i, 0), jnp.minimum(i + 1, height - 1))
     )
+    # Beyond the edge so much that half-way, on the pole, all columns meet in their mean.
+    edges = jnp.stack([environment[0], environment[-1]])
+    ends = 2 * jnp.mean(edges, axis=1).reshape(2, *(1,) * (lower.ndim - 1), edges.shape[-1])
+    i = i[..., None]
+    upper = jnp.where(i < 0, ends[0] - lower, upper)
+    lower = jnp.where(i == height - 1, ends[1] - upper, lower)
     return upper * (1 - down) + lower * down
 
 

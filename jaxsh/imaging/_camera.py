@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -18,6 +19,7 @@ from .._core.checks import (
     check_type,
     described,
 )
+from .._core.host import put
 from ..geometry import Mesh
 
 
@@ -26,8 +28,9 @@ def _point(name: str):
 
     def convert(value: Any) -> Array:
         vector = as_finite(value, name, wait=True)
-        whole = not isinstance(value, Array) and np.asarray(value).dtype.kind in "iu"
-        return vector.astype(jnp.float32) if whole else vector
+        if isinstance(value, Array) or np.asarray(value).dtype.kind not in "iu":
+            return vector
+        return put(np.asarray(value), np.float32)
 
     return convert
 
@@ -120,7 +123,7 @@ class Camera(eqx.Module):
             width=width,
             height=height,
         )
-        right, upward, forward = np.asarray(aim._axes(), np.float64)
+        right, upward, forward = np.asarray(aim.on_host()[1], np.float64)
         seen = np.asarray(mesh.vertices, np.float64)[np.unique(np.asarray(mesh.faces))]
         if not len(seen) or not np.ptp(seen, axis=0).any():
             raise ValueError("expected a mesh that is larger than a point, to place a camera")
@@ -148,26 +151,56 @@ class Camera(eqx.Module):
         n is height · width; dtype that of `position`. Differentiable in every field that is not
         a size. Shards over a batch of cameras (`vmap`), not over the pixels of one.
         """
-        right, upward, forward = self._axes()
-        dtype = self.position.dtype
-        tan_y = jnp.tan(jnp.radians(jnp.asarray(self.fov_y, dtype)) / 2)
-        columns = (2 * jnp.arange(self.width, dtype=dtype) + 1) / self.width - 1
-        rows = 1 - (2 * jnp.arange(self.height, dtype=dtype) + 1) / self.height
-        x, y = jnp.meshgrid(columns * tan_y * (self.width / self.height), rows * tan_y)
-        directions = _unit(
-            x.reshape(-1, 1) * right[None] + y.reshape(-1, 1) * upward[None] + forward[None]
-        )
-        return jnp.broadcast_to(self.position[None], directions.shape), directions
+        return _rays(self)
 
     def _axes(self) -> tuple[Array, Array, Array]:
         """Compute unit vectors to the right, upwards and forward in the picture."""
-        forward = _unit(self.target.astype(self.position.dtype) - self.position)
-        right = _unit(jnp.cross(forward, self.up.astype(forward.dtype)))
-        return right, jnp.cross(right, forward), forward
+        return _axes(self.position, self.target, self.up)
+
+    def on_host(self) -> tuple[np.ndarray, np.ndarray]:
+        """Position and axes (3, 3) of a camera that is known, in NumPy: no program to compile."""
+        position, target, up = (np.asarray(a) for a in (self.position, self.target, self.up))
+        return position, np.stack(_axes(position, target, up))
 
 
-def _unit(x: Array) -> Array:
-    return x / jnp.linalg.norm(x, axis=-1, keepdims=True)
+def host_rays(camera: Camera) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+    """`Camera.rays` of a camera that is known, in NumPy; the origins are one that is repeated."""
+    position, axes = camera.on_host()
+    directions = _directions(camera, tuple(axes), np.asarray(camera.fov_y, position.dtype))
+    return np.broadcast_to(position, directions.shape), directions
+
+
+@jax.jit
+def _rays(camera: Camera):
+    axes, dtype = camera._axes(), camera.position.dtype
+    directions = _directions(camera, axes, jnp.asarray(camera.fov_y, dtype))
+    return jnp.broadcast_to(camera.position[None], directions.shape), directions
+
+
+def _directions(camera: Camera, axes: tuple[Any, Any, Any], fov_y: Any) -> Any:
+    """Compute unit directions through the pixel centers, (n, 3)."""
+    right, upward, forward = axes
+    numpy, dtype = np if isinstance(right, np.ndarray) else jnp, right.dtype
+    tan_y = numpy.tan(numpy.radians(fov_y) / 2)
+    columns = (2 * numpy.arange(camera.width, dtype=dtype) + 1) / camera.width - 1
+    rows = 1 - (2 * numpy.arange(camera.height, dtype=dtype) + 1) / camera.height
+    x, y = (columns * tan_y * (camera.width / camera.height))[None], (rows * tan_y)[:, None]
+    across, up = x[..., None] * right[None, None], y[..., None] * upward[None, None]
+    # The axes are square to each other.
+    length = numpy.sqrt(x * x + (y * y + 1))[..., None]
+    return ((across + (up + forward[None, None])) / length).reshape(-1, 3)
+
+
+def _axes(position: Any, target: Any, up: Any) -> tuple[Any, Any, Any]:
+    numpy, dtype = np if isinstance(position, np.ndarray) else jnp, position.dtype
+    forward = _unit(target.astype(dtype) - position)
+    right = _unit(numpy.cross(forward, up.astype(dtype)))
+    return right, numpy.cross(right, forward), forward
+
+
+def _unit(x: Any) -> Any:
+    numpy = np if isinstance(x, np.ndarray) else jnp
+    return x / numpy.linalg.norm(x, axis=-1, keepdims=True)
 
 
 def _center(x: np.ndarray, depth: np.ndarray) -> float:

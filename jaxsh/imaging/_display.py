@@ -2,14 +2,16 @@
 
 import functools
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
-from .._core.checks import as_float, check_choice, check_number, described, is_concrete
+from .._core.checks import as_float, check_choice, check_number, described, host_known, is_concrete
+from .._core.host import put
 from .._core.linalg import einsum
 from .._core.pictures import as_picture, as_radiance
 from .._core.srgb import LUMINANCE
@@ -144,6 +146,8 @@ def auto_exposure(
     percentile = check_number("percentile", percentile, least=0.0, most=100.0)
     image = as_picture("image", image)
     _check_mask(mask, image)
+    if host_known(image) and (mask is None or host_known(mask)):
+        return put(_known_exposure(np.asarray(image), mask, percentile), image.dtype)
     exposure = functools.partial(_auto_exposure, percentile=percentile)
     return keep_rows(exposure, image, mask, like=image, axis=0, out=None)
 
@@ -155,6 +159,15 @@ def _auto_exposure(image, mask, percentile: float) -> Float[Array, ""]:
         brightest = jnp.where(mask, brightest, jnp.nan)
     level = jnp.nanpercentile(brightest, percentile)
     return jnp.where(level > 0, 1 / jnp.where(level > 0, level, 1), 1)
+
+
+def _known_exposure(image: np.ndarray, mask: Any, percentile: float) -> np.ndarray:
+    """`_auto_exposure` on the host, where NumPy need not sort all pixels."""
+    brightest = functools.reduce(np.maximum, np.moveaxis(image, -1, 0))
+    brightest = brightest.ravel() if mask is None else brightest[np.asarray(mask)]
+    brightest = brightest[~np.isnan(brightest)]
+    level = np.percentile(brightest, percentile) if len(brightest) else 0
+    return np.asarray(1 / level if level > 0 else 1)
 
 
 def psnr(

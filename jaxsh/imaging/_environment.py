@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from .._core.checks import as_path, check_flag, check_size, check_type
+from .._core.host import put
 from .._core.words import reason
 from ._files import FORMATS, Picture, check_encoding, read_picture
 from ._layouts import check_shape, used_pixels
@@ -221,4 +221,4 @@ def studio(height: int = 256, width: int = 512) -> Float[Array, "height width 3"
     for direction, kappa, color in _LOBES:
         cosine = directions @ (np.array(direction) / np.linalg.norm(direction))
         radiance = radiance + np.exp(kappa * (cosine - 1))[..., None] * np.array(color)
-    return jnp.asarray(radiance, jnp.float32)
+    return put(radiance, np.float32)

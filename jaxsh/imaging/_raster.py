@@ -10,12 +10,11 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from .._core.checks import as_float, check_size, check_type, is_concrete
+from .._core.host import put
 from .._core.linalg import einsum
 from .._core.xla import keep_rows, rows_are_split
 from ..geometry import Mesh, RayScene, ray_scene
-from ._camera import Camera
-
-_rays = eqx.filter_jit(Camera.rays)
+from ._camera import Camera, host_rays
 
 
 class Raster(eqx.Module):
@@ -57,7 +56,7 @@ class Raster(eqx.Module):
     @property
     def mask(self) -> Bool[Array, "h w"]:
         """True where the whole pixel is on the object."""
-        return self.alpha == 1
+        return _mask(self.face, self.samples)
 
 
 def rasterize(
@@ -91,9 +90,8 @@ def rasterize(
     shape = (camera.height * samples, camera.width * samples)
     finer = dataclasses.replace(camera, height=shape[0], width=shape[1])
     scene = ray_scene(mesh) if scene is None else scene
-    hit = scene.closest_hit(*_rays(finer))
-    face = jnp.asarray(hit.face.reshape(shape))
-    barycentric = jnp.asarray(hit.barycentric.reshape(*shape, 3))
+    hit = scene.closest_hit(*host_rays(finer))
+    face, barycentric = put(hit.face.reshape(shape)), put(hit.barycentric.reshape(*shape, 3))
     uv, footprint = (None, None)
     if mesh.uv is not None:
         uv, footprint = _in_texture(mesh.vertices, mesh.faces, mesh.uv, face, barycentric, finer)
@@ -167,6 +165,11 @@ def _alpha(face: Int[Array, "hn wn"], samples: int) -> Float[Array, "h w"]:
     return keep_rows(lambda x: _resolve(x, samples), on_object, like=face, axis=0, out=0)[..., 0]
 
 
+@functools.partial(jax.jit, static_argnums=1)
+def _mask(face: Int[Array, "hn wn"], samples: int) -> Bool[Array, "h w"]:
+    return _alpha(face, samples) == 1
+
+
 @jax.jit
 def _interpolate(raster: Raster, values, background, color):
     def pixels(raster: Raster, values, background, color):
@@ -191,7 +194,10 @@ def between(
     corners: Float[Array, "*shape 3 c"], barycentric: Float[Array, "*shape 3"]
 ) -> Float[Array, "*shape c"]:
     """Take the mean of what is at the corners of faces, by weights, in the dtype of the former."""
-    return einsum("...kc,...k->...c", corners, barycentric.astype(corners.dtype))
+    weights = barycentric.astype(corners.dtype)
+    # Written out: XLA would store what it gathers for a product of small matrices.
+    a, b, c = (corners[..., k, :] * weights[..., k, None] for k in range(3))
+    return a + b + c
 
 
 def _resolve(samples: Float[Array, "hn wn c"], n: int) -> Float[Array, "h w c"]:

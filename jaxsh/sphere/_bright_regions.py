@@ -6,7 +6,7 @@ picture's pixels; the picture goes on over its seam and over its poles.
 
 import itertools
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -15,7 +15,6 @@ from ._quadrature import fejer_weights
 
 _ROWS = 256  # of the coarse copy: 0.7° to a cell, a little more than the sun is wide
 _STEP = 1.25  # from level to level
-_EIGHT = np.ones((3, 3))
 
 
 class Coarse(NamedTuple):
@@ -85,11 +84,9 @@ class Coarse(NamedTuple):
 
 def grown(mask: Bool[np.ndarray, "h w"], reach: int) -> Bool[np.ndarray, "h w"]:
     """Cells of a mask and all that are up to `reach` cells away from it, on the sphere."""
-    from scipy import ndimage  # only splitting a sun needs it, and `import jaxsh.sphere` is light
-
     for _ in range(reach):
-        wrapped = np.concatenate([mask[:, -1:], mask, mask[:, :1]], axis=1)
-        mask = ndimage.binary_dilation(wrapped, _EIGHT)[:, 1:-1]
+        mask = np.pad(mask | np.roll(mask, 1, axis=1) | np.roll(mask, -1, axis=1), ((1, 1), (0, 0)))
+        mask = mask[:-2] | mask[1:-1] | mask[2:]
         for pole in (0, -1):
             mask[pole] |= mask[pole].any()
     return mask
@@ -108,21 +105,34 @@ def _edges(count: int, block: int) -> Int[np.ndarray, " n"]:
 
 def _label(mask: Bool[np.ndarray, "h w"]) -> tuple[Int[np.ndarray, "h w"], int]:
     """Number the connected cells of a mask from 1, across the seam and the poles too."""
-    from scipy import ndimage
-    from scipy.sparse import coo_array, csgraph
-
-    numbered: Any = ndimage.label(mask, _EIGHT)
-    labels, count = numbered
-    first, last = labels[:, 0], labels[:, -1]
-    pairs = [np.stack([last, np.roll(first, shift)]) for shift in (-1, 0, 1)]
-    pairs[0][:, -1], pairs[2][:, 0] = 0, 0  # no row is beside the one at the other pole
-    for row in (labels[0], labels[-1]):  # all of its cells touch the pole
-        lit = row[row > 0]
-        if lit.size:
-            pairs.append(np.stack([lit, np.full_like(lit, lit[0])]))
-    a, b = np.concatenate(pairs, axis=1)
-    both = (a > 0) & (b > 0)
-    links = coo_array((np.ones(both.sum()), (a[both], b[both])), shape=(count + 1, count + 1))
-    joined, number = csgraph.connected_components(links, directed=False)
+    number = np.where(mask, np.cumsum(mask).reshape(mask.shape), 0)
+    # Each cell and its neighbors to the right and in the row below.
+    wrapped = np.concatenate([number[:, -1:], number, number[:, :1]], axis=1)
+    pairs = [(number, wrapped[:, 2:])]
+    pairs += [(number[:-1], wrapped[1:, k : k + mask.shape[1]]) for k in range(3)]
+    for row in (number[:1], number[-1:]):  # all of its cells touch the pole
+        pairs.append((row, np.where(row > 0, row.max(), 0)))
+    one, two = (np.concatenate([a.ravel() for a in side]) for side in zip(*pairs, strict=True))
+    both = (one > 0) & (two > 0)
     # Number 0 is the background's, which has no link.
-    return number[labels], joined - 1
+    _, least = np.unique(_joined(one[both], two[both], int(number.max()) + 1), return_inverse=True)
+    return least[number], int(least.max())
+
+
+def _joined(
+    one: Int[np.ndarray, " n"], two: Int[np.ndarray, " n"], count: int
+) -> Int[np.ndarray, " count"]:
+    """The least of the things that links join each of `count` things with.
+
+    SciPy's `connected_components`, whose import takes longer than all else that is done here.
+    """
+    least = np.arange(count)
+    while True:
+        one, two = least[one], least[two]
+        apart = one != two
+        if not apart.any():
+            return least
+        one, two = one[apart], two[apart]
+        np.minimum.at(least, np.maximum(one, two), np.minimum(one, two))
+        while ((further := least[least]) != least).any():
+            least = further

@@ -4,11 +4,11 @@ import warnings
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float
 
 from .._core.checks import as_host_float, check_finite, check_number, check_size, said_dtype
+from .._core.host import put
 from .._core.pictures import check_shape
 from ._bright_regions import Coarse, grown
 from ._suns import Suns, local_frames
@@ -170,11 +170,11 @@ def _suns(sources: list[_Source], size: tuple[int, int], rays: int, dtype: np.dt
         points, weights = _points(source, weights / weights.sum(), size, rays)
         middle = weights @ points
         direction[i] = middle / np.linalg.norm(middle)
-        frame = np.asarray(local_frames(jnp.asarray(direction[i : i + 1])))[0].astype(np.float64)
+        frame = local_frames(direction[i : i + 1])[0]
         shape[i] = _equal_shares(points @ frame, weights, rays)
     order = np.argsort(-(radiance.sum(axis=1) * solid_angle))
     arrays = (direction[order], solid_angle[order], radiance[order], shape[order])
-    return Suns(*(jnp.asarray(array, dtype) for array in arrays))
+    return Suns(*(put(array, dtype) for array in arrays))
 
 
 def _points(

@@ -1,6 +1,7 @@
 """Compact sources of light apart from the rest: what they are, their rays, their coefficients."""
 
 import functools
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -8,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_degree, check_size
+from .._core.checks import as_float, check_degree, check_size, host_known
+from .._core.host import put
 from .._core.linalg import einsum
 from .._core.vectors import checked_rotation, components_first, normalize
 from .._core.xla import keep_rows
@@ -89,12 +91,18 @@ class Suns(eqx.Module):
         """
         if self.shape is None:
             count = check_size("count", _RAYS if count is None else count)
-            return _disc_rays(self.direction, self.solid_angle, count)
-        has = self.shape.shape[1]
-        count = has if count is None else check_size("count", count)
-        if has % count:
-            raise ValueError(f"count must divide the {has} vectors of the shape, got {count}")
-        return _shaped_rays(self.direction, self.shape, count)
+        else:
+            has = self.shape.shape[1]
+            count = has if count is None else check_size("count", count)
+            if has % count:
+                raise ValueError(f"count must divide the {has} vectors of the shape, got {count}")
+        given = (self.direction, self.solid_angle, self.shape)
+        if not host_known(*given):
+            return _traced_rays(*given, count)
+        # A few vectors: NumPy has them before a program is compiled.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            direction, angle, shape = (None if a is None else np.asarray(a) for a in given)
+            return put(_rays(direction, angle, shape, count))
 
     def harmonics(self, degree: int) -> Float[Array, "3 k"]:
         """Project all of the sources onto the basis: coefficients of their light together.
@@ -132,26 +140,26 @@ class Suns(eqx.Module):
         return _rotated(self, turn)
 
 
-@functools.partial(jax.jit, static_argnums=2)
-def _disc_rays(direction, solid_angle, count: int):
-    local = _spiral(count)
-    within = solid_angle.astype(direction.dtype)[:, None] / (2 * np.pi)  # 1 - cos of the rim
-    area = jnp.asarray(local[:, 2], direction.dtype)[None] * within
-    radius = jnp.sqrt(jnp.maximum(area * (2 - area), 0))
-    flat = jnp.asarray(local[:, :2], direction.dtype)[None] * radius[..., None]
-    return _placed(direction, jnp.concatenate([flat, (1 - area)[..., None]], axis=-1))
+def _rays(direction: Any, solid_angle: Any, shape: Any, count: int) -> Any:
+    numpy, dtype = np if isinstance(direction, np.ndarray) else jnp, direction.dtype
+    if shape is None:
+        local = _spiral(count)
+        within = solid_angle.astype(dtype)[:, None] / (2 * np.pi)  # 1 - cos of the rim
+        area = numpy.asarray(local[:, 2], dtype)[None] * within
+        radius = numpy.sqrt(numpy.maximum(area * (2 - area), 0))
+        flat = numpy.asarray(local[:, :2], dtype)[None] * radius[..., None]
+        vectors = numpy.concatenate([flat, (1 - area)[..., None]], axis=-1)
+    else:
+        suns, has, _ = shape.shape
+        groups = shape.astype(dtype).reshape(suns, count, has // count, 3)
+        vectors = _unit(groups.sum(axis=2)) if count < has else groups[:, :, 0]
+    frames = local_frames(direction)
+    if numpy is np:
+        return np.einsum("sij,snj->sni", frames, vectors)
+    return einsum("sij,snj->sni", frames, vectors)
 
 
-@functools.partial(jax.jit, static_argnums=2)
-def _shaped_rays(direction, shape, count: int):
-    suns, has, _ = shape.shape
-    groups = shape.astype(direction.dtype).reshape(suns, count, has // count, 3)
-    local = _unit(groups.sum(axis=2)) if count < has else groups[:, :, 0]
-    return _placed(direction, local)
-
-
-def _placed(direction, local):
-    return einsum("sij,snj->sni", local_frames(direction), local)
+_traced_rays = jax.jit(_rays, static_argnums=3)
 
 
 @functools.partial(jax.jit, static_argnums=1)
@@ -177,22 +185,27 @@ def _rotated(suns: Suns, turn):
     return Suns(direction, suns.solid_angle, suns.radiance, shape)
 
 
-def _unit(vectors: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3"]:
+def _unit(vectors: Any) -> Any:
+    if isinstance(vectors, np.ndarray):
+        vectors = vectors / np.abs(vectors).max(axis=-1, keepdims=True, initial=0)
+        return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     unit, _ = normalize(components_first(vectors))
     return unit[:, 0].T.reshape(vectors.shape)
 
 
-@jax.jit
-def local_frames(direction: Float[Array, "s 3"]) -> Float[Array, "s 3 3"]:
-    """Rotations whose last column is the direction: Duff et al. 2017, "Building an orthonormal
-    basis, revisited", smooth in each of the hemispheres about the z axis.
+def local_frames(direction: Any) -> Any:
+    """Rotations (s, 3, 3) whose last column is the direction (s, 3), in NumPy of NumPy's arrays.
+
+    Duff et al. 2017, "Building an orthonormal basis, revisited", smooth in each of the hemispheres
+    about the z axis.
     """
+    numpy = np if isinstance(direction, np.ndarray) else jnp
     x, y, z = _unit(direction).T
-    sign = jnp.copysign(jnp.ones_like(z), z)
+    sign = numpy.copysign(numpy.ones_like(z), z)
     a = -1 / (sign + z)
     b = x * y * a
     rows = ((1 + sign * x * x * a, b, x), (sign * b, sign + y * y * a, y), (-sign * x, -y, z))
-    return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
+    return numpy.stack([numpy.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _spiral(count: int) -> Float[np.ndarray, "n 3"]:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_finite, check_known, check_type, is_concrete
+from .._core.checks import as_finite, check_finite, check_known, check_type, is_concrete
 from .._core.devices import Devices, mesh_of, share, whole
 from ..harmonics import degree_of
 
@@ -15,8 +15,10 @@ def _as_strong(name: str, least: float | None):
     """Converts to a type of its own, so that numbers and arrays run the same compiled programs."""
 
     def convert(value: ArrayLike) -> Float[Array, "..."]:
+        if type(value) in (int, float):
+            value = np.asarray(value, jnp.result_type(float))
         array = as_finite(value, name, least=least, wait=True)
-        return array.astype(array.dtype)
+        return array.astype(array.dtype) if array.weak_type else array
 
     return convert
 
@@ -248,8 +250,11 @@ def checked_material(material: Material, count: int, dtype: jnp.dtype) -> Materi
 
 def checked_albedo(
     albedo: Float[ArrayLike, "..."], count: int, dtype: jnp.dtype
-) -> Float[Array, "..."]:
+) -> Float[Array | np.ndarray, "..."]:
     """Casts the albedo of a diffuse surface: a number, RGB, or per vertex with one or three."""
+    if isinstance(albedo, int | float) and not isinstance(albedo, bool):
+        check_finite("albedo", float(albedo), least=0.0)
+        return np.asarray(albedo, dtype)
     albedo = as_finite(albedo, "albedo", least=0.0)
     if albedo.shape not in ((), (3,), (count, 1), (count, 3)):
         raise ValueError(

@@ -29,8 +29,9 @@ from ._sun_visibility import (
     turns,
 )
 
-# Vertices whose rays stay in cache.
-_BLOCK = 1024
+# Vertices whose rays stay in cache, and rays of few vertices that do without a loop: it would take
+# longer to compile than it saves.
+_BLOCK, _NUMBERS = 1024, 2**21
 # Of one direction that was cast for another: what float32 rounds it to, and some.
 _TURNED = 1e-5
 
@@ -115,8 +116,18 @@ def shade_sun(
         )
     eye = None if eye is None else checked_eye(eye, dtype)
     visibility = _visibility(suns, surface, scene, shadows, count)
+    rays, middle = aimed(suns, 1 if visibility is None else visibility.seen.shape[2])
     return _shade_sun(
-        suns, positions, normals, visibility, given, eye, distant=distant, normalized=normalized
+        suns,
+        rays,
+        middle,
+        positions,
+        normals,
+        visibility,
+        given,
+        eye,
+        distant=distant,
+        normalized=normalized,
     )
 
 
@@ -164,7 +175,9 @@ def _visibility(suns, surface, scene, shadows, count) -> SunVisibility | None:
 
 
 @functools.partial(jax.jit, static_argnames=("distant", "normalized"))
-def _shade_sun(suns, positions, normals, visibility, material, eye, *, distant, normalized):
+def _shade_sun(
+    suns, rays, middle, positions, normals, visibility, material, eye, *, distant, normalized
+):
     dtype, shaped = positions.dtype, suns.shape is not None
     upright = unit(normals.astype(dtype).T).T
     rows = {"normals": upright}
@@ -173,7 +186,6 @@ def _shade_sun(suns, positions, normals, visibility, material, eye, *, distant, 
         rows["exponent"] = jnp.broadcast_to(material.exponent, (len(positions),))
     if visibility is not None:
         rows |= {"seen": visibility.seen, "draw": visibility.draw}
-    rays, middle = aimed(suns, 1 if visibility is None else visibility.seen.shape[2])
     # Of each vertex, all held at once on an accelerator: one with each vector of a shape, or some
     # with each ray to a disc, and through the lobe as many again.
     products = (1 if shaped else 4) * math.prod(rays.shape[:2]) * (1 if eye is None else 2)
@@ -184,7 +196,8 @@ def _shade_sun(suns, positions, normals, visibility, material, eye, *, distant, 
         return _integrals(dict(zip(rows, some, strict=True)), rays, middle, solid_angle, shaped)
 
     most = rows_at_once(products * dtype.itemsize)
-    parts = in_blocks(block, *rows.values(), size=_BLOCK, most=most)
+    size = max(_BLOCK, _NUMBERS // max(products, 1))
+    parts = in_blocks(block, *rows.values(), size=size, most=most)
     radiance = suns.radiance.astype(dtype)
     total = jnp.multiply(*align(matmul(parts[0], radiance), material.diffuse / math.pi))
     if eye is None:

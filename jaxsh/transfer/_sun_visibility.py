@@ -1,6 +1,5 @@
 """Soft shadows of compact sources: the rays from each point of a surface to them, cast once."""
 
-import functools
 import math
 from concurrent.futures import ThreadPoolExecutor
 
@@ -18,10 +17,11 @@ from .._core.checks import (
     check_known,
     check_size,
     check_type,
+    host_known,
     is_concrete,
 )
 from .._core.devices import Devices, mesh_of, share, whole
-from .._core.host import cores
+from .._core.host import cores, put
 from ..geometry import Mesh, Points, RayScene, Texels, ray_scene
 from ..sphere import Suns
 from ._bake._directions import spread
@@ -148,7 +148,7 @@ def sun_visibility(
         as_host_float(getattr(suns, name), f"{name} of the suns")
     given, stopping = surface, scene
     if isinstance(given, Transfer | SampledTransfer):
-        given = Mesh(positions, jnp.zeros((0, 3), jnp.int32), normals)
+        given = Mesh(positions, put(np.zeros((0, 3), np.int32)), normals)
     check_surface(given, ray_bias, offset)
     if scene is None:
         stopping = given.mesh if isinstance(given, Texels) else given
@@ -185,7 +185,7 @@ def sun_visibility(
     parts = [slice(first, first + _BLOCK) for first in range(0, len(start), _BLOCK)]
     with ThreadPoolExecutor(cores()) as pool:
         list(pool.map(run, parts))
-    return SunVisibility(jnp.asarray(seen), jnp.asarray(draw), suns.direction, suns.solid_angle)
+    return SunVisibility(put(seen), put(draw), suns.direction, suns.solid_angle)
 
 
 def _seen(scene, start, vectors, above, guides):
@@ -254,10 +254,22 @@ def _draws(positions: Float[np.ndarray, "v 3"], seed: int) -> UInt32[np.ndarray,
     return state
 
 
-@functools.partial(jax.jit, static_argnums=1)
 def aimed(suns: Suns, count: int) -> tuple[Float[Array, "s n 3"], Float[Array, "s 3"]]:
     """Returns rays to each source, all of those with a shape, and the middle that they surround."""
-    return suns.rays(count if suns.shape is None else None), unit(suns.direction.T).T
+    rays = suns.rays(count if suns.shape is None else None)
+    if host_known(suns.direction):
+        direction = np.asarray(suns.direction)
+        largest = np.abs(direction).max(axis=1, keepdims=True)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            direction = direction / largest
+            direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        return rays, put(np.where((largest > 0) & np.isfinite(largest), direction, 0))
+    return rays, _middle(suns.direction)
+
+
+@jax.jit
+def _middle(direction):
+    return unit(direction.T).T
 
 
 def points_of(surface: Surface) -> tuple[Float[Array, "v 3"], Float[Array, "v 3"]]:
