@@ -13,7 +13,7 @@ from .._core.checks import as_host_float, check_flag, check_size, check_type
 from ..transfer import Transfer
 from ..transfer._glossy_kernels import checked_eye, mirrored, rows_of
 from ._method import check_known
-from ._sharing import made_of_rows, sharing
+from ._sharing import made_of_rows, on_rows, sharing
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 128
@@ -83,62 +83,92 @@ def make_tiling(
     shared = sharing(transfer.coefficients)
     if shared and shared.parts > 1:  # a device with a part of the vertices has as many blocks
         block = max(-(-block // shared.parts), min(block, _LEAST))
-    axis, units = _mirrored(eye, transfer.positions, transfer.normals, distant)
 
-    def split(part, axis, units, areas):
-        axis, first = axis.astype(np.float32).T, part * len(axis)
-        facing = np.sum(units.T * axis, axis=0)
-        weights = areas * (np.maximum(facing, 0) + 0.05)
-        blocks, last = -(-len(weights) // block), len(weights) - 1
+    def split(part, seen):
+        count, dtype = len(seen), seen.dtype
+        blocks = -(-count // block)
         # What fills the last block up weighs nothing.
-        spare = blocks * block - len(weights)
-        weights, axis = np.pad(weights, (0, spare)), np.pad(axis, ((0, 0), (0, spare)), mode="edge")
-        tiles = _split(axis.T, weights, np.arange(len(weights)), min(num_tiles, blocks), block)
+        seen = np.pad(seen.astype(np.float32), ((0, blocks * block - count), (0, 0)), mode="edge")
+        seen[count:, 3] = 0
+        columns = np.ascontiguousarray(seen.T)
+        tiles, means = _split(columns[:3], columns[3], min(num_tiles, blocks), block)
         sizes = [len(tile) // block for tile in tiles]
-        axes = np.stack([_towards(weights[tile] @ axis.T[tile]) for tile in tiles])
-        order = np.minimum(np.concatenate(tiles), last).reshape(-1, block) + first
-        tile = np.repeat(np.arange(len(tiles)), sizes) + part * len(tiles)
-        return order.astype(np.int32), tile.astype(np.int32), axes.astype(units.dtype)
+        first = np.int32(part * count)
+        order = np.minimum(np.concatenate(tiles), np.int32(count - 1)).reshape(-1, block) + first
+        tile = np.repeat(np.arange(len(tiles), dtype=np.int32), sizes)
+        return order, tile + np.int32(part * len(tiles)), _towards(means.astype(dtype))
 
-    return Tiling(*made_of_rows(split, shared, axis.T, units.T, areas))
+    seen = _seen(eye, transfer.positions, transfer.normals, areas, distant)
+    return Tiling(*made_of_rows(split, shared, seen))
 
 
 @functools.partial(jax.jit, static_argnames="distant")
-def _mirrored(eye, positions, normals, distant):
-    """Mirrors the eye about the normals, and returns these at unit length: one program for both."""
+def _seen(eye, positions, normals, areas, distant) -> Float[Array, "v 4"]:
+    """Where each vertex mirrors the eye, and what it weighs."""
     positions, normals = rows_of(positions, normals)
-    return mirrored(eye, positions, normals, distant), normals
+    axis = mirrored(eye, positions, normals, distant)
+    weights = areas * (jnp.maximum(jnp.sum(normals * axis, axis=0), 0) + 0.05)
+    return jnp.concatenate([axis, weights[None].astype(axis.dtype)]).T
 
 
-def _towards(vector: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
-    """Scales to unit length; +z where there is no direction."""
-    length = np.linalg.norm(vector)
-    return vector / length if length > 0 else np.array([0.0, 0.0, 1.0])
-
-
-def _split(axis, weights, vertices, count, block) -> list[np.ndarray]:
+def _split(
+    axis: Float[np.ndarray, "3 n"], weights: Float[np.ndarray, " n"], count: int, block: int
+) -> tuple[list[Int[np.ndarray, " members"]], Float[np.ndarray, "tiles 3"]]:
+    """The members of each tile, and the mean of their axes."""
     serial, queue = 0, []
 
-    def push(members):
+    def push(members, axis, weights):
+        # Components stand in rows of their own, and go down the tree with the tile that they are
+        # of: that is 2.5 times as fast as to look each tile's up among all.
         nonlocal serial
         serial += 1
-        weight, offsets = weights[members], axis[members]
-        offsets = offsets - weight @ offsets / weight.sum()
-        cost = weight @ np.sum(offsets * offsets, axis=1) ** 3
+        mean = axis @ weights / weights.sum()
+        offsets = axis - mean[:, None]
+        squares = np.square(offsets).sum(axis=0)
+        cost = float(weights @ (squares * squares * squares))
         # A single block stays whole: it waits behind all that can be split.
-        heapq.heappush(queue, (-cost if len(members) > block else 1.0, serial, members, offsets))
+        cost = -cost if len(members) > block else 1.0
+        heapq.heappush(queue, (cost, serial, members, offsets, weights, mean, axis))
 
-    push(vertices)
+    push(np.arange(len(weights), dtype=np.int32), axis, weights)
     while len(queue) < count:
-        *_, members, offsets = heapq.heappop(queue)
-        _, vectors = np.linalg.eigh(offsets.T @ (weights[members, None] * offsets))
-        along = offsets @ vectors[:, -1]
+        *_, members, offsets, weights, _, axis = heapq.heappop(queue)
+        _, vectors = np.linalg.eigh((offsets * weights) @ offsets.T)
+        along = vectors[:, -1] @ offsets
         middle = np.count_nonzero(along < (along.min() + along.max()) / 2)
-        cut = block * int(np.clip(round(middle / block), 1, len(members) // block - 1))
+        cut = block * min(max(round(middle / block), 1), len(members) // block - 1)
         parts = np.argpartition(along, cut)
-        push(members[parts[:cut]])
-        push(members[parts[cut:]])
-    return [members for *_, members, _ in queue]
+        for part in (parts[:cut], parts[cut:]):
+            push(members[part], axis.take(part, axis=1), weights[part])
+    *_, tiles, _, _, means, _ = zip(*queue, strict=True)
+    return list(tiles), np.stack(means)
+
+
+def _towards(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """Scales to unit length; +z where there is no direction."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    up = np.array([0, 0, 1], vectors.dtype)
+    return np.where(lengths > 0, vectors / np.where(lengths > 0, lengths, 1), up)
+
+
+@functools.partial(jax.jit, static_argnames="shared")
+def _areas(points, neighbors, shared):
+    def estimate(points, neighbors):
+        count = len(points)
+        numbers = jnp.arange(count, dtype=neighbors.dtype)[:, None]
+        if shared and shared.names is not None:
+            neighbors = neighbors - count * jax.lax.axis_index(shared.names)
+        near = (neighbors >= 0) & (neighbors < count)
+        others, squares = jnp.where(near, neighbors, numbers), 0.0
+        for x in points.T:
+            along = x.at[others].get(mode="promise_in_bounds") - x[:, None]
+            squares += jnp.sum(along * along, axis=1)
+        edges = jnp.sum(near & (neighbors != numbers), axis=1, dtype=points.dtype)
+        areas = squares / jnp.maximum(edges, 1)
+        mean = jnp.mean(areas)
+        return jnp.where(mean > 0, jnp.maximum(areas / mean, 1e-3), jnp.ones_like(areas))
+
+    return on_rows(estimate, shared, (0, 0), 0, points, neighbors)
 
 
 def vertex_areas(transfer: Transfer) -> Float[Array, " v"]:
@@ -147,14 +177,5 @@ def vertex_areas(transfer: Transfer) -> Float[Array, " v"]:
     Where devices share the vertices, of edges between those of the same device.
     """
 
-    def estimate(part, points, neighbors):
-        numbers = np.arange(len(points))[:, None]
-        neighbors = neighbors - part * len(points)
-        near = np.where((neighbors >= 0) & (neighbors < len(points)), neighbors, numbers)
-        squares = np.sum((points[near] - points[:, None]) ** 2, axis=(1, 2))
-        areas = squares / np.maximum((near != numbers).sum(axis=1), 1)
-        mean = areas.mean()
-        return (np.maximum(areas / mean, 1e-3) if mean > 0 else np.ones_like(areas),)
-
     shared = sharing(transfer.coefficients)
-    return made_of_rows(estimate, shared, transfer.positions, transfer.neighbors)[0]
+    return _areas(transfer.positions, transfer.neighbors, shared)
