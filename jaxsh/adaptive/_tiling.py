@@ -1,7 +1,6 @@
 """Tilings: vertices that mirror the eye into nearly the same direction share a tile."""
 
 import functools
-import heapq
 
 import equinox as eqx
 import jax
@@ -14,6 +13,7 @@ from ..transfer import Transfer
 from ..transfer._glossy_kernels import checked_eye, mirrored, rows_of
 from ._method import check_known
 from ._sharing import made_of_rows, on_rows, sharing
+from ._splits import split as tiles_of
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 128
@@ -90,13 +90,11 @@ def make_tiling(
         # What fills the last block up weighs nothing.
         seen = np.pad(seen.astype(np.float32), ((0, blocks * block - count), (0, 0)), mode="edge")
         seen[count:, 3] = 0
-        columns = np.ascontiguousarray(seen.T)
-        tiles, means = _split(columns[:3], columns[3], min(num_tiles, blocks), block)
-        sizes = [len(tile) // block for tile in tiles]
-        first = np.int32(part * count)
-        order = np.minimum(np.concatenate(tiles), np.int32(count - 1)).reshape(-1, block) + first
-        tile = np.repeat(np.arange(len(tiles), dtype=np.int32), sizes)
-        return order, tile + np.int32(part * len(tiles)), _towards(means.astype(dtype))
+        tiled, sizes, means = tiles_of(seen[:, :3].T, seen[:, 3], min(num_tiles, blocks), block)
+        order = np.minimum(tiled, np.int32(count - 1)).reshape(-1, block)
+        tile = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
+        first = np.int32(part * count), np.int32(part * len(sizes))
+        return order + first[0], tile + first[1], _towards(means.astype(dtype))
 
     seen = _seen(eye, transfer.positions, transfer.normals, areas, distant)
     return Tiling(*made_of_rows(split, shared, seen))
@@ -104,44 +102,11 @@ def make_tiling(
 
 @functools.partial(jax.jit, static_argnames="distant")
 def _seen(eye, positions, normals, areas, distant) -> Float[Array, "v 4"]:
-    """Where each vertex mirrors the eye, and what it weighs."""
+    """Tells where each vertex mirrors the eye, and what it weighs."""
     positions, normals = rows_of(positions, normals)
     axis = mirrored(eye, positions, normals, distant)
     weights = areas * (jnp.maximum(jnp.sum(normals * axis, axis=0), 0) + 0.05)
     return jnp.concatenate([axis, weights[None].astype(axis.dtype)]).T
-
-
-def _split(
-    axis: Float[np.ndarray, "3 n"], weights: Float[np.ndarray, " n"], count: int, block: int
-) -> tuple[list[Int[np.ndarray, " members"]], Float[np.ndarray, "tiles 3"]]:
-    """The members of each tile, and the mean of their axes."""
-    serial, queue = 0, []
-
-    def push(members, axis, weights):
-        # Components stand in rows of their own, and go down the tree with the tile that they are
-        # of: that is 2.5 times as fast as to look each tile's up among all.
-        nonlocal serial
-        serial += 1
-        mean = axis @ weights / weights.sum()
-        offsets = axis - mean[:, None]
-        squares = np.square(offsets).sum(axis=0)
-        cost = float(weights @ (squares * squares * squares))
-        # A single block stays whole: it waits behind all that can be split.
-        cost = -cost if len(members) > block else 1.0
-        heapq.heappush(queue, (cost, serial, members, offsets, weights, mean, axis))
-
-    push(np.arange(len(weights), dtype=np.int32), axis, weights)
-    while len(queue) < count:
-        *_, members, offsets, weights, _, axis = heapq.heappop(queue)
-        _, vectors = np.linalg.eigh((offsets * weights) @ offsets.T)
-        along = vectors[:, -1] @ offsets
-        middle = np.count_nonzero(along < (along.min() + along.max()) / 2)
-        cut = block * min(max(round(middle / block), 1), len(members) // block - 1)
-        parts = np.argpartition(along, cut)
-        for part in (parts[:cut], parts[cut:]):
-            push(members[part], axis.take(part, axis=1), weights[part])
-    *_, tiles, _, _, means, _ = zip(*queue, strict=True)
-    return list(tiles), np.stack(means)
 
 
 def _towards(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
