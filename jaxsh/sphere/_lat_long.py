@@ -1,21 +1,24 @@
 """Lat-long pictures: projection and reconstruction that separate into rows and meridians.
 
-Since y_lm(θ, φ) = P_lm(θ) · cos or sin(|m|φ), a picture's sums along its rows, one per order, are
-all that its coefficients need: W·H·(2L+1) + H·K multiplications in place of W·H·K.
+y_lm(θ, φ) = P_lm(θ) · cos or sin(|m|φ), and P_lm is a sum of the waves cos kθ for even m, of sin kθ
+for odd m. So a picture's sums along its columns, one per wave, are all that its coefficients need:
+W·H·(2L+1) multiplications in place of W·H·K, in one product that reads the picture as it lies.
 """
 
 import functools
+from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Float, Int
 
 from .._core.checks import as_float, check_coefficients, check_degree, check_size
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
 from .._core.pictures import as_radiance, check_result, check_shape
-from .._core.xla import keep_rows
-from ..harmonics import degree_of, degrees, index, legendre, orders
+from .._core.xla import keep_rows, on_mesh
+from ..harmonics import degree_of, degrees, legendre, orders
 from ._quadrature import fejer_weights
 
 
@@ -84,43 +87,85 @@ def reconstruct_lat_long(
 @functools.partial(jax.jit, static_argnums=1)
 def _project(image, degree: int):
     height, width, _ = image.shape
-    meridians, azimuths = _tables(height, width, degree)
-    weights = fejer_weights(height) * 2 * np.pi / width
+    waves, kinds = _tables(height, width, degree)
+    weighted = waves * (fejer_weights(height) * 2 * np.pi / width)
 
     def sums(image):
-        along_rows = einsum("hwc,mw->mhc", image, azimuths.astype(image.dtype))
-        return einsum("mhc,mlh->cml", along_rows, (meridians * weights).astype(image.dtype))
+        dtype = image.dtype
+        columns = _of_rows("hk,h...->k...", weighted.T.astype(dtype), image)
+        parts = []
+        for kind in kinds:
+            some = jnp.swapaxes(columns[kind.waves], 1, 2)  # so that columns are summed as they lie
+            moments = einsum("kcw,mw->kcm", some, kind.azimuths.astype(dtype))
+            parts.append(einsum("kcm,mlk->cml", moments, kind.meridians.astype(dtype)))
+        return jnp.concatenate(parts, axis=1)
 
     def over_columns(image):
         return keep_rows(sums, image, like=image, axis=1, out=None)
 
     padded = keep_rows(over_columns, image, like=image, axis=0, out=None)
     l, m = degrees(degree), orders(degree)
-    return padded[:, m + degree, l]
+    place = np.argsort(np.concatenate([kind.orders for kind in kinds]))
+    return padded[:, place[m + degree], l]
 
 
 @functools.partial(jax.jit, static_argnums=(1, 2))
 def _reconstruct(coefficients, height: int, width: int):
     degree = degree_of(coefficients.shape[-1])
-    meridians, azimuths = _tables(height, width, degree)
-    # A coefficient (l, m) with l < |m| does not exist: whatever is there meets a zero meridian.
-    place = np.array(
-        [[index(max(l, abs(m)), m) for l in range(degree + 1)] for m in range(-degree, degree + 1)],
-        dtype=np.int32,
-    )
+    waves, kinds = _tables(height, width, degree)
     dtype = coefficients.dtype
-    along_rows = einsum("cml,mlh->mhc", coefficients[:, place], meridians.astype(dtype))
-    return einsum("mhc,mw->hwc", along_rows, azimuths.astype(dtype))
+    columns = []
+    for kind in kinds:
+        # A coefficient (l, m) with l < |m| does not exist: what is there meets a zero meridian.
+        l = np.maximum(np.arange(degree + 1), np.abs(kind.orders)[:, None])
+        place = (l * (l + 1) + kind.orders[:, None]).astype(np.int32)
+        moments = einsum("cml,mlk->kcm", coefficients[:, place], kind.meridians.astype(dtype))
+        some = einsum("kcm,mw->kcw", moments, kind.azimuths.astype(dtype))
+        columns.append(jnp.swapaxes(some, 1, 2))
+    return _of_rows("hk,k...->h...", waves.T.astype(dtype), jnp.concatenate(columns))
+
+
+def _of_rows(
+    subscripts: str, factors: ArrayLike, rows: Float[Array, "r w c"]
+) -> Float[Array, "s w c"]:
+    """Sums of rows with factors: one product over columns and channels as they lie in memory."""
+    if on_mesh(rows):  # flat, columns and channels would lose their sharding
+        return einsum(subscripts, factors, rows)
+    # Flat, the derivative is such a product too. XLA would transpose the picture that it makes.
+    flat = einsum(subscripts, factors, rows.reshape(len(rows), -1))
+    return flat.reshape(len(flat), *rows.shape[1:])
+
+
+class _Kind(NamedTuple):
+    """The orders that are even, or odd: their meridians are sums of cosines, or of sines."""
+
+    orders: Int[np.ndarray, " m"]
+    waves: slice  # of the table of waves
+    meridians: Float[np.ndarray, "m l k"]  # coefficients of the waves; zero where l < |m|
+    azimuths: Float[np.ndarray, "m w"]  # cos mφ, or sin |m|φ where m < 0
 
 
 @read_only_cache(maxsize=32)
 def _tables(
     height: int, width: int, degree: int
-) -> tuple[Float[np.ndarray, "m l h"], Float[np.ndarray, "m w"]]:
-    """Meridians P_lm by order, degree and row, zero where l < |m|; azimuths cos mφ or sin |m|φ."""
-    theta = (np.arange(height) + 0.5) * np.pi / height
+) -> tuple[Float[np.ndarray, "waves h"], tuple[_Kind, ...]]:
+    """Waves along a meridian, cos kθ for k = 0..L and sin kθ for k = 1..L; and what they make."""
+    count = degree + 1
+    nodes = (np.arange(count) + 0.5) * np.pi / count  # here the waves are orthogonal
     phi = (np.arange(width) + 0.5) * 2 * np.pi / width
-    meridians = np.zeros((2 * degree + 1, degree + 1, height))
-    meridians[orders(degree) + degree, degrees(degree)] = legendre(np.cos(theta), degree)
-    m = np.arange(-degree, degree + 1)[:, None]
-    return meridians, np.where(m < 0, np.sin(-m * phi), np.cos(m * phi))
+    values = np.zeros((2 * degree + 1, count, count))
+    values[orders(degree) + degree, degrees(degree)] = legendre(np.cos(nodes), degree)
+    at_nodes, all_orders, kinds = _waves(nodes, degree), np.arange(-degree, degree + 1), []
+    for parity, waves in enumerate([slice(count), slice(count, None)][: min(count, 2)]):
+        some = all_orders[all_orders % 2 == parity]
+        meridians = values[some + degree] @ at_nodes[waves].T
+        meridians /= (at_nodes[waves] ** 2).sum(axis=1)
+        m = some[:, None]
+        azimuths = np.where(m < 0, np.sin(-m * phi), np.cos(m * phi))
+        kinds.append(_Kind(some, waves, meridians, azimuths))
+    return _waves((np.arange(height) + 0.5) * np.pi / height, degree), tuple(kinds)
+
+
+def _waves(theta: Float[np.ndarray, " n"], degree: int) -> Float[np.ndarray, "waves n"]:
+    angles = np.multiply.outer(np.arange(degree + 1), theta)
+    return np.concatenate([np.cos(angles), np.sin(angles[1:])])
