@@ -12,7 +12,7 @@ from .._core.checks import align, as_float, check_choice, check_coefficients, ch
 from .._core.linalg import dot, einsum, matmul
 from .._core.xla import keep_rows, on_mesh
 from ._basis import evaluate
-from ._indexing import degrees, orders
+from ._indexing import degree_of, degrees, orders
 from ._tables import legendre
 from ._windows import softening
 from ._zonal import clamped_cosine, convolve, phong
@@ -101,25 +101,30 @@ def dering(
             f"a shared window is for several functions (..., C, K), got shape {judged.shape}"
         )
 
-    def least(judged):
-        if judged.ndim > 1:
-            return jax.vmap(least)(judged)
-        return _least_strength(judged, degree)
-
     spec = (*jax.typeof(judged).sharding.spec, *[None] * judged.ndim)[: judged.ndim]
     rows = next((axis for axis, name in enumerate(spec) if name is not None), 0)
-    strength = keep_rows(least, judged, like=judged, axis=rows, out=rows)
-    if not shared:
-        return _windowed(coefficients, strength, degree), strength
-    # No strength is below zero, which is what stands where there are no functions.
-    strength = jnp.max(strength, axis=-1, initial=0)
-    return _windowed(coefficients, strength[..., None], degree), strength
+    least = functools.partial(_least_strengths, degree=degree)
+    return _windowed(
+        coefficients, keep_rows(least, judged, like=judged, axis=rows, out=rows), shared
+    )
 
 
-def _windowed(
-    coefficients: Float[Array, "*batch k"], strength: Float[Array, "*out"], degree: int
-) -> Float[Array, "*all k"]:
-    return jnp.multiply(*align(coefficients, softening(strength, degree)))
+@functools.partial(jax.jit, static_argnames="degree")
+def _least_strengths(judged, degree: int):
+    if judged.ndim > 1:
+        return jax.vmap(functools.partial(_least_strengths, degree=degree))(judged)
+    return _least_strength(judged, degree)
+
+
+@functools.partial(jax.jit, static_argnums=2)
+def _windowed(coefficients, strength, shared: bool):
+    if shared:
+        # No strength is below zero, which is what stands where there are no functions.
+        strength = jnp.max(strength, axis=-1, initial=0)
+    window = softening(
+        strength[..., None] if shared else strength, degree_of(coefficients.shape[-1])
+    )
+    return jnp.multiply(*align(coefficients, window)), strength
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1,))

@@ -76,9 +76,14 @@ def rotate(
     """
     coefficients = as_float(coefficients, "coefficients")
     degree = check_coefficients("coefficients", coefficients)
-    rotation = checked_rotation(rotation).astype(coefficients.dtype)
+    rotation = checked_rotation(rotation)
     check_batches(coefficients=coefficients.shape, rotation=rotation.shape[:-1])
-    matrix = _rotation_matrix(rotation, degree)
+    return _rotate(coefficients, rotation, degree)
+
+
+@functools.partial(jax.jit, static_argnums=2)
+def _rotate(coefficients, rotation, degree: int):
+    matrix = _rotation_matrix(rotation.astype(coefficients.dtype), degree)
     if matrix.ndim == 2:
         return matmul(coefficients, matrix.T)
     return einsum("...ij,...j->...i", matrix, coefficients)
@@ -109,10 +114,16 @@ def rotate_z(
     """
     coefficients = as_float(coefficients, "coefficients")
     degree = check_coefficients("coefficients", coefficients)
+    angle = as_float(angle, "angle")
+    check_batches(coefficients=coefficients.shape, angle=(*angle.shape, 1))
+    return _rotate_z(coefficients, angle, degree)
+
+
+@functools.partial(jax.jit, static_argnums=2)
+def _rotate_z(coefficients, angle, degree: int):
     m = orders(degree)
     mirrored = coefficients[..., np.arange(len(m), dtype=np.int32) - 2 * m]
-    phase = as_float(angle, "angle").astype(coefficients.dtype)[..., None]
-    check_batches(coefficients=coefficients.shape, angle=phase.shape)
+    phase = angle.astype(coefficients.dtype)[..., None]
     phase = jnp.multiply(*align(phase, jnp.asarray(m, phase.dtype)))
     coefficients, mirrored, phase = align(coefficients, mirrored, phase)
     return jnp.cos(phase) * coefficients - jnp.sin(phase) * mirrored

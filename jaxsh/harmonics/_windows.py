@@ -3,11 +3,13 @@
 import functools
 from typing import Literal
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import align, as_float, check_choice, check_degree, is_concrete
+from .._core.host import put
 from ._indexing import degrees, orders
 
 WINDOWS = ("none", "hann", "lanczos", "zonal-sinc", "positive")
@@ -53,7 +55,7 @@ def window(
             values = np.where(orders(degree) == 0, np.sinc(l / bands), 1.0)
         case "positive":
             values = _positive(degree)[l]
-    return jnp.asarray(values, jnp.result_type(float))
+    return put(values, jnp.result_type(float))
 
 
 def damping(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "*batch k"]:
@@ -82,6 +84,11 @@ def damping(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "
     if is_concrete(strength) and (negative := np.asarray(strength) < 0).any():
         found = np.asarray(strength)[negative].flat[0]
         raise ValueError(f"a window's strength must be at least 0, got {found:g}")
+    return _damping(strength, degree)
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _damping(strength, degree: int):
     strength = strength[..., None]
     squared = ((degrees(degree) * (degrees(degree) + 1.0)) ** 2).astype(strength.dtype)
     strength, squared = align(strength, jnp.asarray(squared))
@@ -118,6 +125,11 @@ def softening(strength: Float[ArrayLike, "*batch"], degree: int) -> Float[Array,
             raise ValueError(
                 f"a window's strength must be from 0 to 2, got {known[outside].flat[0]:g}"
             )
+    return _softening(strength, degree)
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _softening(strength, degree: int):
     strength = strength[..., None]
     l = degrees(degree)
     strength, positive, higher = align(

@@ -1,5 +1,9 @@
 """Zonal kernels, given by their zonal SH coefficients g_l, and convolution with them."""
 
+import functools
+from typing import Any
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
@@ -11,8 +15,10 @@ from .._core.checks import (
     check_coefficients,
     check_degree,
     check_flag,
+    host_known,
     is_concrete,
 )
+from .._core.host import put
 from ._indexing import degrees
 
 
@@ -31,7 +37,8 @@ def clamped_cosine(degree: int) -> Float[Array, " bands"]:
     >>> [round(float(g), 3) for g in harmonics.clamped_cosine(degree=3)]
     [0.886, 1.023, 0.495, 0.0]
     """
-    return phong(jnp.ones(()), degree)
+    degree, dtype = check_degree(degree), np.dtype(jnp.result_type(float))
+    return put(_phong(np, np.ones((), dtype), degree, False))
 
 
 def phong(
@@ -64,13 +71,25 @@ def phong(
         if (wrong := ~((known > -1) & np.isfinite(known))).any():
             found = known[wrong].flat[0]
             raise ValueError(f"a Phong exponent must be finite and above -1, got {found:g}")
+    # A few numbers: NumPy has them before a program is compiled.
+    if host_known(k):
+        return put(_phong(np, np.asarray(k), degree, normalized))
+    return _traced_phong(k, degree, normalized)
+
+
+def _phong(numpy: Any, k: Any, degree: int, normalized: bool) -> Any:
     integrals = [1 / (k + 1), 1 / (k + 2)]
     for l in range(2, degree + 1):
         integrals.append(integrals[-2] * (k - (l - 2)) / (k + (l + 1)))
-    lambdas = 2 * np.pi * jnp.stack(integrals[: degree + 1], axis=-1)
+    lambdas = 2 * np.pi * numpy.stack(integrals[: degree + 1], axis=-1)
     if normalized:
         lambdas = lambdas / lambdas[..., :1]
-    return jnp.divide(*align(lambdas, _unit_lambdas(degree, lambdas.dtype)))
+    return lambdas / _unit_lambdas(numpy, degree, lambdas)
+
+
+@functools.partial(jax.jit, static_argnums=(1, 2))
+def _traced_phong(k, degree: int, normalized: bool):
+    return _phong(jnp, k, degree, normalized)
 
 
 def disc(solid_angle: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "*batch bands"]:
@@ -104,17 +123,29 @@ def disc(solid_angle: Float[ArrayLike, "*batch"], degree: int) -> Float[Array, "
         if (wrong := ~((known >= 0) & (known <= 12.56638))).any():
             found = known[wrong].flat[0]
             raise ValueError(f"expected solid_angle from 0 to 4π, got {found:g}")
+    if host_known(omega):
+        return put(_disc(np, np.asarray(omega), degree))
+    return _traced_disc(omega, degree)
+
+
+def _disc(numpy: Any, omega: Any, degree: int) -> Any:
     height = omega / (2 * np.pi)  # 1 - c
     c = 1 - height
     lambdas = [omega]
     # P_{l+1}' = P_{l-1}' + (2l+1) P_l, and P_l by its own recurrence.
-    before, value, slope_before, slope = jnp.ones_like(c), c, jnp.zeros_like(c), jnp.ones_like(c)
+    one = numpy.ones_like(c)
+    before, value, slope_before, slope = one, c, numpy.zeros_like(c), one
     for l in range(1, degree + 1):
         lambdas.append(omega * (2 - height) * slope / (l * (l + 1)))
         slope_before, slope = slope, slope_before + (2 * l + 1) * value
         before, value = value, ((2 * l + 1) * c * value - l * before) / (l + 1)
-    stacked = jnp.stack(lambdas, axis=-1)
-    return jnp.divide(*align(stacked, _unit_lambdas(degree, stacked.dtype)))
+    stacked = numpy.stack(lambdas, axis=-1)
+    return stacked / _unit_lambdas(numpy, degree, stacked)
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _traced_disc(omega, degree: int):
+    return _disc(jnp, omega, degree)
 
 
 def convolve(
@@ -149,12 +180,17 @@ def convolve(
             f"band, got shape {zonal.shape}"
         )
     check_batches(coefficients=coefficients.shape, zonal=zonal.shape)
-    lambdas = jnp.multiply(*align(zonal, _unit_lambdas(degree, zonal.dtype)))
-    return jnp.multiply(
-        *align(coefficients, lambdas[..., degrees(degree)].astype(coefficients.dtype))
-    )
+    return _convolve(coefficients, zonal, degree)
 
 
-def _unit_lambdas(degree: int, dtype) -> Float[Array, " bands"]:
-    """Ratios λ_l / g_l = √(4π/(2l+1))."""
-    return jnp.asarray(np.sqrt(4 * np.pi / (2 * np.arange(degree + 1) + 1)), dtype)
+@functools.partial(jax.jit, static_argnums=2)
+def _convolve(coefficients, zonal, degree: int):
+    lambdas = zonal * _unit_lambdas(jnp, degree, zonal)
+    each = lambdas[..., degrees(degree)].astype(coefficients.dtype)
+    return jnp.multiply(*align(coefficients, each))
+
+
+def _unit_lambdas(numpy: Any, degree: int, like: Any) -> Any:
+    """Ratios λ_l / g_l = √(4π/(2l+1)), with the dtype and the rank of an array (..., degree+1)."""
+    ratios = np.sqrt(4 * np.pi / (2 * np.arange(degree + 1) + 1))
+    return numpy.asarray(ratios.reshape((1,) * (like.ndim - 1) + ratios.shape), like.dtype)

@@ -65,10 +65,10 @@ def backdrop(environment: Float[Array, "height width c"], camera: Camera) -> Flo
     check_values("environment", environment)
     known = host_known(environment, camera.position, camera.target, camera.up)
     if known and is_concrete(camera.fov_y):  # a program less to compile
-        directions = put(host_rays(camera)[1])
+        directions = put(host_rays(camera)[1].reshape(camera.height, camera.width, 3))
     else:
-        _, directions = camera.rays()
-    return look_up(environment, directions.reshape(camera.height, camera.width, 3))
+        directions = camera.rays()[1].reshape(camera.height, camera.width, 3)
+    return look_up(environment, directions)
 
 
 @jax.jit

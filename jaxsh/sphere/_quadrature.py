@@ -7,6 +7,7 @@ from jaxtyping import Array, Float
 
 from .._core.checks import as_float, check_known, check_size
 from .._core.devices import Devices, last_of, mesh_of, share
+from .._core.host import put
 from ..harmonics._tables import exact_grid
 
 
@@ -172,4 +173,4 @@ def fejer_weights(height: int) -> Float[np.ndarray, " height"]:
 
 def _quadrature(directions: np.ndarray, weights: np.ndarray) -> Quadrature:
     dtype = jnp.result_type(float)
-    return Quadrature(jnp.asarray(directions, dtype), jnp.asarray(weights, dtype))
+    return Quadrature(put(directions, dtype), put(weights, dtype))
