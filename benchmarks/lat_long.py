@@ -109,7 +109,7 @@ class _Ducc:
         found = np.stack(self.analyses()["analysis"]())[:, 0]
         l, m = np.array([(l, m) for m in range(degree + 1) for l in range(m, degree + 1)]).T
         scale = np.where(m > 0, np.sqrt(2) * (-1.0) ** m, 1)  # its phase is Condon and Shortley's
-        cosines, sines = scale * found.real, -(scale * found.imag)[:, m > 0]
+        cosines, sines = scale * np.real(found), -(scale * np.imag(found))[:, m > 0]
         np.testing.assert_allclose(cosines, light[:, l * (l + 1) + m], rtol=0, atol=1e-3)
         ours = light[:, (l * (l + 1) - m)[m > 0]]
         np.testing.assert_allclose(sines, ours, rtol=0, atol=1e-3)
