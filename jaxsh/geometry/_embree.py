@@ -146,10 +146,14 @@ class EmbreeRayScene:
         """
         origins, directions = paired(origins, directions)
         limits = limits_of(max_distance, len(origins))
+        endless = np.ndim(max_distance) == 0 and max_distance == math.inf
         result = np.empty(len(origins), bool)
 
         def run(part: slice) -> None:
             *rays, ahead = prepared(origins, directions, part, self.frame)
+            if endless and ahead is None:
+                np.not_equal(self._scene.run(*rays, query="OCCLUDED"), -1, out=result[part])
+                return
             limit = self.frame.limits(limits[part], ahead)
             reaches = limit > 0  # Embree takes others for no limit
             found = self._scene.run(*rays, query="OCCLUDED", dists=limit)
@@ -157,6 +161,17 @@ class EmbreeRayScene:
 
         self._each_chunk(len(origins), run)
         return result
+
+    def stops(
+        self, starts: Float[np.ndarray, "n 3"], towards: Float[np.ndarray, "n 3"]
+    ) -> Bool[np.ndarray, " n"]:
+        """Tell what `occluded` does of float32 rays that are in the frame, of unit length.
+
+        Not checked, and cast on the calling thread: for programs that ask from several.
+        """
+        if not self._built:
+            self._build()
+        return self._scene.run(starts, towards, query="OCCLUDED") != -1
 
     def closest_hit(self, origins: Vectors, directions: Vectors) -> Hit:
         """Find the first surface that each ray meets. Arguments and errors as for `occluded`."""

@@ -41,11 +41,15 @@ class Frame(NamedTuple):
         """Largest coordinate of an origin that is cast as it is."""
         return _FAR * (self.radius + float(np.abs(self.middle).max(initial=0)))
 
+    def beyond(self, origins: Float[np.ndarray, "n 3"]) -> bool:
+        """Tell whether some origins are not cast as they are, but brought nearer."""
+        return not np.abs(self.into(origins)).max(initial=0) <= self.far
+
     def into(self, positions: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
         """Map positions, in float32; those beyond its range become infinite."""
         with np.errstate(over="ignore", invalid="ignore"):
             if self.plain:
-                return np.ascontiguousarray(positions, np.float32)
+                return np.asarray(positions, np.float32)
             moved = (positions.astype(np.float64) - self.center) * self.scale
             return moved.astype(np.float32)
 
@@ -143,4 +147,4 @@ def framed(meshes: Sequence[Mesh]) -> tuple[list[np.ndarray], list[np.ndarray], 
     if not (low <= high).all():
         low = high = np.zeros(3)
     frame = frame_around(low, high)
-    return [frame.into(vertices) for vertices in points], faces, frame
+    return [np.ascontiguousarray(frame.into(vertices)) for vertices in points], faces, frame

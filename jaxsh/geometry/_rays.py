@@ -115,7 +115,7 @@ def limits_of(max_distance: Any, count: int) -> np.ndarray:
 def prepared(
     origins: np.ndarray, directions: np.ndarray, part: slice, frame: Frame
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Give one chunk as Embree wants it: contiguous float32, directions of unit length.
+    """Give one chunk as Embree wants it: float32, directions of unit length.
 
     Origins are in the frame. Those of far away are brought nearer: by how much, in the frame, is
     the third array, None where there are none.
@@ -126,7 +126,7 @@ def prepared(
     squared = _squared(towards)
     least, most = squared.min(), squared.max()
     # Nearly always all is well, and extremes show it: the slow path is exact about what is not.
-    near = -frame.far <= start.min() and start.max() <= frame.far
+    near = _squared(start).max() <= frame.far**2
     if not (least > 1e-30 and most < 1e30 and near):
         given, towards = origins[part], directions[part].astype(np.float64)
         largest = np.abs(towards).max(axis=1, keepdims=True)
@@ -142,7 +142,7 @@ def prepared(
         squared = _squared(towards)
     if least < 1 - 1e-6 or most > 1 + 1e-6:  # else they are units already
         towards = towards / np.sqrt(squared)[:, None]
-    towards = np.ascontiguousarray(towards, np.float32)
+    towards = np.asarray(towards, np.float32)
     ahead = None
     if not near:
         start, ahead = frame.nearer(origins[part], np.broadcast_to(towards, start.shape))

@@ -13,9 +13,8 @@ from jaxtyping import Array, Float, Int
 from ..._core.linalg import matmul
 from ...geometry import RayTree
 from ...geometry._pairs import cast_pairs, met_along
-from ...harmonics import clamped_cosine, convolve, evaluate, num_coefficients
 from ._directions import Directions
-from ._receivers import Faces
+from ._receivers import Faces, unshadowed
 
 # Numbers that a bounce looks up at once at the ends of its rays, for each lane.
 _LOOKED_UP = 128
@@ -42,15 +41,12 @@ class Reflectors(NamedTuple):
 
 
 def lights(directions: Directions) -> Lights:
-    """Put directions on the default device, in the order in which they are cast."""
-    vectors, guides = directions.vectors, directions.guides
-    others = np.setdiff1d(np.arange(len(vectors)), guides)
-    order = np.concatenate([guides, others])
+    """Put directions on the default device."""
     return Lights(
-        vectors=jnp.asarray(vectors[order]),
-        rays=jnp.asarray(vectors[order].astype(np.float32)),
-        basis=jnp.asarray(directions.basis)[order],
-        nearest=jnp.asarray(directions.nearest[others].astype(np.int32)),
+        vectors=jnp.asarray(directions.vectors),
+        rays=jnp.asarray(directions.vectors.astype(np.float32)),
+        basis=jnp.asarray(directions.basis),
+        nearest=jnp.asarray(directions.nearest.astype(np.int32)),
         around=jnp.asarray(directions.around.astype(np.int32)),
     )
 
@@ -100,7 +96,7 @@ def shadowed_rows(
         asked = rest & doubtful[:, lights.nearest]
         told = rest & ~asked & answer[:, lights.nearest]
         blocked = jnp.concatenate([answer, told | (cast(lights.rays[guides:], asked) >= 0)], axis=1)
-    exact = _unshadowed(normals, degree, cosine)
+    exact = unshadowed(normals, degree, cosine)
     coefficients = exact - matmul(jnp.where(blocked, cosines, 0), lights.basis)
     dark = jnp.any(above, axis=1) & jnp.all(above == blocked, axis=1)
     return jnp.where(dark[:, None], 0, coefficients)
@@ -151,15 +147,3 @@ def _cosines(
         return matmul(normals, vectors.T)
     defined = jnp.any(normals != 0, axis=1, keepdims=True).astype(normals.dtype)
     return jnp.broadcast_to(defined, (len(normals), len(vectors)))
-
-
-def _unshadowed(normals: Float[Array, "m 3"], degree: int, cosine: bool) -> Float[Array, "m k"]:
-    """Expand the clamped cosine about each normal, zero about a zero normal; or the sphere."""
-    defined = jnp.any(normals != 0, axis=1, keepdims=True)
-    if not cosine:
-        whole = np.zeros((1, num_coefficients(degree)))
-        whole[0, 0] = math.sqrt(4 * math.pi)
-        return jnp.where(defined, jnp.asarray(whole, normals.dtype), 0)
-    up = jnp.asarray([0, 0, 1], normals.dtype)[None]
-    exact = convolve(evaluate(jnp.where(defined, normals, up), degree), clamped_cosine(degree))
-    return jnp.where(defined, exact, 0)

@@ -116,7 +116,7 @@ class DeviceJob(Job):
         whole = 1 << (self.num_points - 1).bit_length()
         self.chunk = max(min(1 << wanted.bit_length() - 1, whole), TILE)
         with self._there():
-            self._direct = lights(self._lights)
+            self._direct = lights(self._directions)
         self._lock = threading.Lock()
         self._reflecting: tuple[Any, Reflectors] | None = None
 

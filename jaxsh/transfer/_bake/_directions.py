@@ -3,9 +3,8 @@
 import math
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
 from ...sphere import fibonacci
 from ._receivers import basis_at
@@ -14,20 +13,19 @@ from ._receivers import basis_at
 # vertex casts about as many rays as with an even set of the granted size, and errs less: the
 # experiment `first_light` prints by how much it errs, and the rays that it takes.
 _QUADRATURE, _GUIDES, _FEWEST_GUIDES = 9 / 4, 1 / 2, 256
-_AROUND = 8
+_AROUND, _BLOCK = 8, 256
 
 
 class Directions(NamedTuple):
-    """Holds D directions of equal weight, G of them guides.
+    """Holds D directions of equal weight in the order in which they are cast, G guides first.
 
     Where a guide and those around it agree on whether light is blocked, so do, nearly always,
     the directions nearest to it: these are cast only elsewhere.
     """
 
     vectors: Float[np.ndarray, "d 3"]
-    basis: Float[Array, "d k"]  # y_i times the directions' weight
-    guides: Int[np.ndarray, " g"]  # which directions they are
-    nearest: Int[np.ndarray, " d"]  # each direction's guide, as one of G; a guide's is itself
+    basis: Float[np.ndarray, "d k"]  # y_i times the directions' weight
+    nearest: Int[np.ndarray, " r"]  # the guide of each of the R = D - G others
     around: Int[np.ndarray, "n g"]  # the guides next to each guide; none where all are guides
 
 
@@ -35,23 +33,32 @@ def guided(rays: int, degree: int, seed: int, dtype: np.dtype) -> Directions:
     """Make a quadrature finer than `rays` on the sphere, cast whole only where guides disagree."""
     count = math.ceil(_QUADRATURE * rays)
     vectors = turned_fibonacci(count, seed, dtype)
-    basis = jnp.asarray(basis_at(vectors, degree) * (4 * math.pi / count))
     number = min(count, max(round(_GUIDES * rays), _FEWEST_GUIDES))
-    if number == count:  # no guide speaks for another direction, so none needs its neighbors
-        all_of_them = np.arange(count)
-        return Directions(vectors, basis, all_of_them, all_of_them, np.empty((0, count), int))
-    guides = spread(vectors, number)
-    chosen = vectors[guides]
-    ranked = np.concatenate(
-        [np.argsort(-(part @ chosen.T), axis=1)[:, 1 : _AROUND + 1] for part in _parts(chosen)]
-    )
-    return Directions(
-        vectors=vectors,
-        basis=basis,
-        guides=guides,
-        nearest=np.concatenate([(part @ chosen.T).argmax(axis=1) for part in _parts(vectors)]),
-        around=np.ascontiguousarray(ranked.T),
-    )
+    guides, nearest, around = vectors, np.empty(0, np.intp), np.empty((0, count), np.intp)
+    if number < count:  # else no guide speaks for another direction, and needs no neighbors
+        chosen = spread(vectors, number)
+        guides, others = vectors[chosen], np.delete(vectors, chosen, axis=0)
+        vectors = np.concatenate([guides, others])
+        nearest = _nearest(others, guides, 1)[0]
+        around = _nearest(guides, guides, 1 + _AROUND)[1:]
+    basis = basis_at(vectors, degree) * (4 * math.pi / count)
+    return Directions(vectors, basis.astype(dtype, copy=False), nearest, around)
+
+
+def _nearest(
+    vectors: Float[np.ndarray, "n 3"], among: Float[np.ndarray, "g 3"], count: int
+) -> Int[np.ndarray, "count n"]:
+    """Find the indices of the `count` vectors nearest to each one, nearest first."""
+    found = np.empty((count, len(vectors)), np.intp)
+    for start in range(0, len(vectors), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        x, y, z = vectors[part].T[..., None]
+        # Not as a matrix product, whose threads keep a core busy while they wait.
+        far = -(x * among[:, 0] + y * among[:, 1] + z * among[:, 2])
+        some = np.argpartition(far, count - 1, axis=1)[:, :count]
+        order = np.take_along_axis(far, some, axis=1).argsort(axis=1, stable=True)
+        found[:, part] = np.take_along_axis(some, order, axis=1).T
+    return found
 
 
 def turned_fibonacci(count: int, seed: int, dtype: np.dtype) -> Float[np.ndarray, "count 3"]:
@@ -68,14 +75,12 @@ def spread(vectors: Float[np.ndarray, "d 3"], count: int) -> Int[np.ndarray, " c
     """Choose `count` vectors, each farthest from those before it; ascending indices."""
     chosen = np.empty(count, int)
     distance = np.full(len(vectors), np.inf)
+    x, y, z = np.ascontiguousarray(vectors.T)
     farthest = 0
     for i in range(count):
         chosen[i] = farthest
-        distance = np.minimum(distance, 1 - vectors @ vectors[farthest])
+        u, v, w = vectors[farthest]
+        np.minimum(distance, 1 - (u * x + v * y + w * z), out=distance)
         distance[farthest] = -1  # rounding must not let it be chosen again
         farthest = int(distance.argmax())
     return np.sort(chosen)
-
-
-def _parts(vectors: np.ndarray) -> list[np.ndarray]:
-    return [vectors[start : start + 1024] for start in range(0, len(vectors), 1024)]

@@ -1,15 +1,18 @@
 """One block of vertices: its shadowed coefficients, and those of a bounce."""
 
+import functools
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from ..._core.linalg import matmul
-from ...geometry import RayScene
+from ...geometry import EmbreeRayScene, RayScene
 from ._directions import Directions
 from ._receivers import Faces, Receivers, unshadowed
 
@@ -17,13 +20,53 @@ from ._receivers import Faces, Receivers, unshadowed
 # whatever the block it comes in.
 TILE = 64
 # Tiles in a call, each multiplied by itself: a call takes longer than the product of a small one.
+# Never another number, so that one compiled program serves all blocks.
 _TOGETHER = 4
+
+
+class Bundle(NamedTuple):
+    """Holds directions as every block uses them."""
+
+    across: Float[Array, "3 d"]  # by component, on a device
+    rays: Float[np.ndarray, "d 4"]  # float32, of which the first three count
+
+
+class Lights(NamedTuple):
+    """Holds what every block uses of `Directions`."""
+
+    bundle: Bundle
+    basis: Float[Array, "d k"]  # on a device
+    nearest: Int[np.ndarray, " r"]
+    around: Int[np.ndarray, "n g"]
+
+
+def bundle_of(vectors: Float[np.ndarray, "d 3"]) -> Bundle:
+    """Prepare directions for `bounced`."""
+    return Bundle(jnp.asarray(vectors.T), in_fours(vectors.astype(np.float32)))
+
+
+def lights_of(directions: Directions) -> Lights:
+    """Prepare directions for `shadowed`."""
+    vectors, basis, nearest, around = directions
+    return Lights(bundle_of(vectors), jnp.asarray(basis), nearest, around)
+
+
+def in_fours(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 4"]:
+    """Fill vectors up with a zero: NumPy copies four numbers faster than three."""
+    return np.pad(vectors, ((0, 0), (0, 1)))
+
+
+def exact_rows(
+    normals: Float[np.ndarray, "rows 3"], degree: int, cosine: bool
+) -> Float[np.ndarray, "rows k"]:
+    """Compute the coefficients of points on which nothing casts a shadow."""
+    return _in_pieces(functools.partial(_exact, degree=degree, cosine=cosine), normals)
 
 
 def shadowed(
     scene: RayScene,
     receivers: Receivers,
-    directions: Directions,
+    lights: Lights,
     degree: int,
     rows: slice,
 ) -> Float[np.ndarray, "rows k"]:
@@ -34,51 +77,124 @@ def shadowed(
     The cosine's are exact, so that only the blocked part carries the error of the directions, and
     none is left where nothing is blocked. Exactly zero where no ray gets out.
     """
-    normals = receivers.normals[rows]
-    cosines = _cosines(receivers, directions.vectors, rows)
-    above = cosines > 0
-    blocked = _blocked(scene, receivers.origins[rows], directions, above)
-    part = _in_tiles(cosines * blocked, directions.basis)
-    coefficients = unshadowed(normals, degree, receivers.cosine) - part
-    coefficients[above.any(axis=1) & (above == blocked).all(axis=1)] = 0
-    return coefficients
+    normals, cosine = receivers.normals[rows], receivers.cosine
+    facing = functools.partial(_above, across=lights.bundle.across, cosine=cosine)
+    above = _in_pieces(facing, normals)
+    blocked = _blocked(scene, receivers.origins[rows], lights, above)
+    state = np.add(above, blocked, dtype=np.uint8)
+    given = {"across": lights.bundle.across, "basis": lights.basis}
+    return _in_pieces(
+        functools.partial(_lit, **given, degree=degree, cosine=cosine), normals, state
+    )
+
+
+@functools.partial(jax.jit, static_argnames="cosine")
+def _above(
+    normals: Float[Array, "rows 3"], across: Float[Array, "3 d"], *, cosine: bool
+) -> Bool[Array, "rows d"]:
+    return _cosines(normals, across, cosine=cosine) > 0
+
+
+@functools.partial(jax.jit, static_argnames="cosine")
+def _cosines(
+    normals: Float[Array, "rows 3"], across: Float[Array, "3 d"], *, cosine: bool
+) -> Float[Array, "rows d"]:
+    """Compute by what light along each direction counts; no ray is cast where that is not > 0."""
+    if not cosine:
+        return jnp.ones((len(normals), across.shape[1]), normals.dtype)
+    x, y, z = (normals[:, axis, None] * across[None, axis] for axis in range(3))
+    return x + y + z
+
+
+@functools.partial(jax.jit, static_argnames=("degree", "cosine"))
+def _exact(normals: Float[Array, "rows 3"], *, degree: int, cosine: bool) -> Float[Array, "rows k"]:
+    return lax.map(
+        lambda tile: unshadowed(tile, degree, cosine), normals.reshape(-1, TILE, 3)
+    ).reshape(len(normals), -1)
+
+
+@functools.partial(jax.jit, static_argnames=("degree", "cosine"))
+def _lit(
+    normals: Float[Array, "rows 3"],
+    state: UInt8[Array, "rows d"],  # of a direction: 0 below the surface, 1 open, 2 blocked
+    across: Float[Array, "3 d"],
+    basis: Float[Array, "d k"],
+    *,
+    degree: int,
+    cosine: bool,
+) -> Float[Array, "rows k"]:
+    def of_tile(tile: tuple[Array, Array]) -> Float[Array, "tile k"]:
+        normals, state = tile
+        lost = jnp.where(state == 2, _cosines(normals, across, cosine=cosine), 0)
+        rows = unshadowed(normals, degree, cosine) - matmul(lost, basis)
+        dark = jnp.all(state != 1, axis=1) & jnp.any(state == 2, axis=1)
+        return jnp.where(dark[:, None], 0, rows)
+
+    tiles = normals.reshape(-1, TILE, 3), state.reshape(-1, TILE, state.shape[1])
+    return lax.map(of_tile, tiles).reshape(len(normals), -1)
+
+
+def _in_pieces(program: Callable[..., Any], *arrays: np.ndarray) -> np.ndarray:
+    """Run a program on `_TOGETHER` tiles of the arrays' rows at a time, the last filled with zeros.
+
+    By XLA, whose threads yield the cores while idle; OpenBLAS's spin, and take them from the rays.
+    """
+    size, count = TILE * _TOGETHER, len(arrays[0])
+    found = []
+    for start in range(0, count, size):
+        rows = [array[start : start + size] for array in arrays]
+        some = len(rows[0])
+        if some < size:
+            rows = [np.pad(part, ((0, size - some), (0, 0))) for part in rows]
+        found.append(np.asarray(program(*rows))[:some])
+    return found[0] if len(found) == 1 else np.concatenate(found)
 
 
 def _blocked(
     scene: RayScene,
     origins: Float[np.ndarray, "rows 3"],
-    directions: Directions,
+    lights: Lights,
     above: Bool[np.ndarray, "rows d"],
 ) -> Bool[np.ndarray, "rows d"]:
     """Find the blocked directions above the surface with as few rays as tell them."""
-    blocked = np.zeros(above.shape, bool)
+    (_, vectors), _, nearest, around = lights
+    guides, stops = around.shape[1], scene.occluded
+    if isinstance(scene, EmbreeRayScene) and not scene.frame.beyond(origins):
+        origins, stops = scene.frame.into(origins), scene.stops
+    starts = in_fours(origins)
 
-    def cast(wanted: Bool[np.ndarray, "rows d"]) -> None:
-        rays = _rays(origins, directions.vectors, wanted)
-        blocked.reshape(-1)[rays.flat] = scene.occluded(rays.origins, rays.directions)
+    def cast(
+        wanted: Bool[np.ndarray, "rows n"],
+        towards: Float[np.ndarray, "n 4"],
+        blocked: Bool[np.ndarray, "rows n"],
+    ) -> None:
+        rays = _rays(starts, towards, wanted)
+        blocked.reshape(-1)[rays.flat] = stops(rays.origins, rays.directions)
 
-    guides, nearest = directions.guides, directions.nearest
-    first = np.zeros_like(above)
-    first[:, guides] = above[:, guides]
-    cast(first)
-    if not len(directions.around):
-        return blocked
-    answer = blocked[:, guides]
-    known = above[:, guides]
-    doubtful = ~known
-    for other in directions.around:
-        doubtful |= (answer != answer[:, other]) & known[:, other]
-    # For all directions at once: 0 lets light through, 1 stops it, 2 is to be cast.
-    told = np.take(np.where(doubtful, np.uint8(2), answer), nearest, axis=1)
-    rest = above & ~first
-    cast(rest & (told == 2))
-    return blocked | (rest & (told == 1))
+    known = np.ascontiguousarray(above[:, :guides])
+    answer = np.zeros(known.shape, bool)
+    cast(known, vectors[:guides], answer)
+    if not len(around):
+        return answer
+    # By guide: 0 below the surface, 1 open, 2 blocked. Of those around the bits are collected, so
+    # that 3 tells of both. A guide's numbers lie side by side, which to gather takes little time.
+    own = np.add(known, answer, dtype=np.uint8).T.copy()
+    met = own.copy()
+    for other in around:
+        met |= own[other]
+    # 0 lets light through, 1 stops it, 2 is to be cast.
+    told = np.where((own == 0) | (met == 3), np.uint8(2), own == 2).T.copy()
+    told = np.take(told, nearest, axis=1)
+    rest = above[:, guides:]
+    blocked = rest & (told == 1)
+    cast(rest & (told == 2), vectors[guides:], blocked)
+    return np.concatenate([answer, blocked], axis=1)
 
 
 def bounced(
     scene: RayScene,
     receivers: Receivers,
-    vectors: Float[np.ndarray, "d 3"],
+    bundle: Bundle,
     surface: Faces,
     share: Float[np.ndarray, " v_or_1"],
     before: Float[np.ndarray, "m k"],
@@ -90,75 +206,39 @@ def bounced(
     """
     from scipy.sparse import csr_array
 
-    cosines = _cosines(receivers, vectors, rows)
-    rays = _rays(receivers.origins[rows], vectors, cosines > 0)
+    facing = functools.partial(_cosines, across=bundle.across, cosine=receivers.cosine)
+    cosines = _in_pieces(facing, receivers.normals[rows])
+    rays = _rays(in_fours(receivers.origins[rows]), bundle.rays, cosines > 0)
     hit = scene.closest_hit(rays.origins, rays.directions)
     met = np.flatnonzero(hit.mesh == 0)
     met = met[np.einsum("ij,ij->i", surface.outward[hit.face[met]], rays.directions[met]) < 0]
 
-    weights = cosines.reshape(-1)[rays.flat[met]] * (4 * math.pi / len(vectors))
+    weights = cosines.reshape(-1)[rays.flat[met]] * (4 * math.pi / len(bundle.rays))
     weights = weights[:, None] * hit.barycentric[met].astype(cosines.dtype)
-    ends = 3 * np.searchsorted(rays.row[met], np.arange(len(cosines) + 1))
+    ends = 3 * np.searchsorted(met, rays.ends)
     corners = surface.faces[hit.face[met]]
     weights *= share[corners] if len(share) > 1 else share
     shape = len(cosines), len(before)
     return csr_array((weights.ravel(), corners.ravel(), ends), shape) @ before
 
 
-def _cosines(
-    receivers: Receivers, vectors: Float[np.ndarray, "d 3"], rows: slice
-) -> Float[np.ndarray, "rows d"]:
-    """Compute by what light along each direction counts; no ray is cast where that is not > 0."""
-    normals = receivers.normals[rows]
-    if receivers.cosine:
-        return _in_tiles(normals, vectors.T)
-    return np.ones((len(normals), len(vectors)), normals.dtype)
-
-
 class _Rays(NamedTuple):
     flat: Int[np.ndarray, " n"]  # index into the array of rows and directions
-    row: Int[np.ndarray, " n"]
+    ends: Int[np.ndarray, " rows+1"]  # rays before each row, and all
     origins: Float[np.ndarray, "n 3"]
     directions: Float[np.ndarray, "n 3"]
 
 
 def _rays(
-    origins: Float[np.ndarray, "rows 3"],
-    directions: Float[np.ndarray, "d 3"],
+    origins: Float[np.ndarray, "rows 4"],
+    directions: Float[np.ndarray, "d 4"],
     wanted: Bool[np.ndarray, "rows d"],
 ) -> _Rays:
     """Make one ray for each pair that is wanted, row by row."""
-    count = np.count_nonzero(wanted, axis=1)
-    flat = np.flatnonzero(wanted)
-    row = np.repeat(np.arange(len(wanted)), count)
-    # `repeat` and `take` copy whole vectors, several times as fast as indexing does.
-    towards = np.take(directions, flat - row * wanted.shape[1], axis=0)
-    return _Rays(flat, row, np.repeat(origins, count, axis=0), towards)
-
-
-def _in_tiles(
-    left: Float[np.ndarray, "rows n"], right: Float[np.ndarray | Array, "n k"]
-) -> Float[np.ndarray, "rows k"]:
-    """Multiply matrices, `TILE` rows at a time, the last ones filled up with zeros.
-
-    By XLA, whose threads yield the cores while idle; OpenBLAS's spin, and take them from the rays.
-    """
-    result = np.empty((len(left), right.shape[1]), left.dtype)
-    start = 0
-    while start < len(left):
-        # One tile or several, never another number: two programs serve all blocks.
-        rows = TILE if len(left) - start <= TILE else _TOGETHER * TILE
-        part = left[start : start + rows]
-        whole = part
-        if len(part) < rows:
-            whole = np.zeros((rows, left.shape[1]), left.dtype)
-            whole[: len(part)] = part
-        products = np.asarray(_products(whole.reshape(-1, TILE, left.shape[1]), right))
-        result[start : start + rows] = products.reshape(rows, -1)[: len(part)]
-        start += rows
-    return result
-
-
-@jax.jit
-def _products(tiles: Array, right: Array) -> Array:
-    return lax.map(lambda tile: matmul(tile, right), tiles)
+    flat, width = np.flatnonzero(wanted), wanted.shape[1]
+    firsts = np.arange(len(wanted) + 1) * width
+    ends = np.searchsorted(flat, firsts)
+    count = np.diff(ends)
+    # `repeat` and `take` copy four numbers at once, several times as fast as indexing does.
+    towards = np.take(directions, flat - np.repeat(firsts[:-1], count), axis=0)
+    return _Rays(flat, ends, np.repeat(origins, count, axis=0)[:, :3], towards[:, :3])

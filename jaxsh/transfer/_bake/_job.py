@@ -13,8 +13,8 @@ from ...geometry import Mesh, RayScene, Surface
 from ...harmonics import num_coefficients
 from .._surfaces import SurfaceKind, kind_of, points_and_normals
 from ._directions import guided, turned_fibonacci
-from ._gather import bounced, shadowed
-from ._receivers import Receivers, faces_of, unshadowed
+from ._gather import bounced, bundle_of, exact_rows, lights_of, shadowed
+from ._receivers import Receivers, faces_of
 
 # What the store of a bake that does not say so is of.
 USUAL = {"surface": "vertices", "cosine": True, "occluder": None}
@@ -118,12 +118,14 @@ class Job:
         self._receivers = Receivers(prepared.origins, prepared.normals, self.cosine)
         with jax.enable_x64(True):
             if arguments.shadows:
-                self._lights = guided(
+                self._directions = guided(
                     arguments.directions, arguments.degree, arguments.seed, self.dtype
                 )
+                self._lights = lights_of(self._directions)
             if arguments.bounces:
                 assert mesh is not None
                 self._vectors = turned_fibonacci(arguments.directions, arguments.seed, self.dtype)
+                self._bundle = bundle_of(self._vectors)
                 self._surface = faces_of(mesh)
                 self._share = np.ravel(self.arguments.albedo).astype(self.dtype) / math.pi
 
@@ -142,7 +144,7 @@ class Job:
         degree = self.arguments.degree
         with jax.enable_x64(True):
             if not self.arguments.shadows:
-                return unshadowed(self.prepared.normals[rows], degree, self.cosine)
+                return exact_rows(self.prepared.normals[rows], degree, self.cosine)
             assert self.scene is not None
             if not bounce:
                 return shadowed(self.scene, self._receivers, self._lights, degree, rows)
@@ -150,7 +152,7 @@ class Job:
             assert before is not None
             assert direct is not None
             return direct + bounced(
-                self.scene, self._receivers, self._vectors, self._surface, self._share, before, rows
+                self.scene, self._receivers, self._bundle, self._surface, self._share, before, rows
             )
 
 

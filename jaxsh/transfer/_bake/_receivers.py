@@ -1,6 +1,5 @@
 """Receivers of light: points off the surface, their normals, their unshadowed coefficients."""
 
-import functools
 import math
 from typing import NamedTuple
 
@@ -38,21 +37,19 @@ def faces_of(mesh: Mesh) -> Faces:
     return Faces(faces, areas_of(np.asarray(mesh.vertices), faces).T)
 
 
-def unshadowed(
-    normals: Float[np.ndarray, "v 3"], degree: int, cosine: bool = True
-) -> Float[np.ndarray, "v k"]:
-    """Expand the clamped cosine about each normal: λ_l y_lm(n), zero about a zero normal.
+def unshadowed(normals: Float[Array, "m 3"], degree: int, cosine: bool) -> Float[Array, "m k"]:
+    """Expand the clamped cosine about each unit normal: λ_l y_lm(n), zero about a zero normal.
 
-    Without it the whole sphere, whose only coefficient is √4π.
+    Without it the whole sphere, whose only coefficient is √4π. In JAX, for a larger program.
     """
+    defined = jnp.any(normals != 0, axis=1, keepdims=True)
     if not cosine:
-        whole = np.zeros((len(normals), num_coefficients(degree)), normals.dtype)
-        whole[:, 0] = math.sqrt(4 * math.pi)
-        return whole
-    defined = normals.any(axis=1, keepdims=True)
-    basis = basis_at(np.where(defined, normals, _UP.astype(normals.dtype)), degree)
-    lambdas = np.asarray(_cosine_lambdas(degree), basis.dtype)
-    return np.where(defined, basis * lambdas, 0)
+        whole = np.zeros((1, num_coefficients(degree)))
+        whole[0, 0] = math.sqrt(4 * math.pi)
+        return jnp.where(defined, jnp.asarray(whole, normals.dtype), 0)
+    up = jnp.asarray(_UP, normals.dtype)[None]
+    exact = convolve(evaluate(jnp.where(defined, normals, up), degree), clamped_cosine(degree))
+    return jnp.where(defined, exact, 0)
 
 
 def basis_at(vectors: Float[np.ndarray, "n 3"], degree: int) -> Float[np.ndarray, "n k"]:
@@ -60,13 +57,11 @@ def basis_at(vectors: Float[np.ndarray, "n 3"], degree: int) -> Float[np.ndarray
     blocks = -(-len(vectors) // _BLOCK)
     padded = np.tile(_UP.astype(vectors.dtype), (blocks * _BLOCK, 1))
     padded[: len(vectors)] = vectors
-    basis = [evaluate(jnp.asarray(block), degree) for block in padded.reshape(blocks, _BLOCK, 3)]
+    basis = [_evaluate(block, degree) for block in padded.reshape(blocks, _BLOCK, 3)]
     return np.concatenate(basis)[: len(vectors)]
 
 
-@functools.partial(jax.jit, static_argnums=0)
-def _cosine_lambdas(degree: int) -> Float[Array, " k"]:
-    return convolve(jnp.ones(num_coefficients(degree)), clamped_cosine(degree))
+_evaluate = jax.jit(evaluate, static_argnums=1)
 
 
 def unit_normals(mesh: Mesh) -> Float[np.ndarray, "v 3"]:
