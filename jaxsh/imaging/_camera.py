@@ -185,10 +185,10 @@ def _directions(camera: Camera, axes: tuple[Any, Any, Any], fov_y: Any) -> Any:
     columns = (2 * numpy.arange(camera.width, dtype=dtype) + 1) / camera.width - 1
     rows = 1 - (2 * numpy.arange(camera.height, dtype=dtype) + 1) / camera.height
     x, y = (columns * tan_y * (camera.width / camera.height))[None], (rows * tan_y)[:, None]
-    across, up = x[..., None] * right[None, None], y[..., None] * upward[None, None]
     # The axes are square to each other.
-    length = numpy.sqrt(x * x + (y * y + 1))[..., None]
-    return ((across + (up + forward[None, None])) / length).reshape(-1, 3)
+    shorter = 1 / numpy.sqrt(x * x + (y * y + 1))
+    parts = [(x * right[k] + (y * upward[k] + forward[k])) * shorter for k in range(3)]
+    return numpy.stack(parts, axis=-1).reshape(-1, 3)
 
 
 def _axes(position: Any, target: Any, up: Any) -> tuple[Any, Any, Any]:
