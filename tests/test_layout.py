@@ -36,6 +36,7 @@ DOORS = {
     "geometry._pairs",
     "harmonics._convention",
     "harmonics._conventions",
+    "harmonics._polynomials",
     "harmonics._tables",
     "harmonics._turns",
     "sky._sun",

@@ -4,10 +4,10 @@ import os
 import warnings
 from typing import Literal
 
-import jax.numpy as jnp
 import numpy as np
 
 from .._core.checks import as_path, check_choice
+from .._core.host import put
 from .._core.ply import Columns, read_elements, read_header
 from .._core.words import reason
 from ._assemble import Origin, check_options
@@ -92,8 +92,8 @@ def read_points(
     if said := ", ".join(f"{n:,} points that {what} dropped" for n, what in found if n):
         warnings.warn(f"{path}: {said}", stacklevel=2)
     return Points(
-        jnp.asarray(positions[kept]),
-        None if normals is None else jnp.asarray(normals[kept], jnp.float32),
+        put(positions[kept]),
+        None if normals is None else put(normals[kept], np.float32),
     )
 
 

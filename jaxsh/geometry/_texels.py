@@ -19,6 +19,7 @@ from .._core.checks import (
     described,
     is_concrete,
 )
+from .._core.host import put
 from .._core.linalg import einsum
 from .._core.xla import keep_rows, rows_are_split
 from ._atlas import Covered, barycentric, cover, nearest, places
@@ -249,11 +250,11 @@ def _texels(
         rows["uv"][part] = np.stack([center[:, 0] / width, 1 - center[:, 1] / height], axis=1)
         rows["barycentric"][part] = weights
     return Texels(
-        **{name: jnp.asarray(array) for name, array in rows.items()},
-        face=jnp.asarray(face),
-        source=jnp.asarray(nearest(source.reshape(height, width), corners, gutter)),
+        **{name: put(array) for name, array in rows.items()},
+        face=put(face),
+        source=put(nearest(source.reshape(height, width), corners, gutter)),
         mesh=mesh,
-        vertex=jnp.asarray(vertex),
+        vertex=put(vertex),
     )
 
 

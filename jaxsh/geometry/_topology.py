@@ -2,11 +2,11 @@
 
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int
 
 from .._core.checks import check_faces, check_type
+from .._core.host import put
 from .._core.ranges import ranges
 from ._indices import first_of_equals, groups
 from ._mesh import Mesh
@@ -171,7 +171,7 @@ def neighbors(mesh: Mesh) -> Int[Array, "v n"]:
     first = np.cumsum(valence) - valence
     table = np.repeat(np.arange(count, dtype=np.int32)[:, None], valence.max(initial=0), axis=1)
     table[vertex, np.arange(len(vertex)) - first[vertex]] = other
-    return jnp.asarray(table)
+    return put(table)
 
 
 def _joined(mesh: Mesh, faces: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ keeps its digits, times z if it is odd.
 """
 
 import functools
+from typing import Any
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -15,11 +16,15 @@ from ._tables import _positive_roots, _sectoral
 
 
 def solid_rows(
-    x: Float[Array, "..."], y: Float[Array, "..."], z: Float[Array, "..."], degree: int
-) -> list[Float[Array, "..."]]:
+    x: Float[Array | np.ndarray, "..."],
+    y: Float[Array | np.ndarray, "..."],
+    z: Float[Array | np.ndarray, "..."],
+    degree: int,
+) -> list[Any]:
     """The K harmonics of unit vectors (x, y, z), one array each, of their shape and dtype.
 
-    Nothing but elementwise arithmetic, so that XLA fuses it with whatever the rows are used for.
+    Nothing but elementwise arithmetic, so that XLA fuses it with whatever the rows are used for,
+    and NumPy's arrays give NumPy's.
     Derivatives are not those of `_solid`: give a function of these rows a rule of its own.
     """
     u, rows = z * z - 0.5, [None] * (degree + 1) ** 2

@@ -11,6 +11,7 @@ from jaxtyping import ArrayLike, Float
 
 from .._core import srgb
 from .._core.checks import as_finite, as_path, check_choice, check_flag, check_number, check_type
+from .._core.host import put
 from ..geometry import BaseColor, Mesh, Texels, write_mesh
 from ._base_color import check_materials
 from ._display import auto_exposure
@@ -149,7 +150,7 @@ def _lit(path: Path, mesh: Mesh, shown: Float[np.ndarray, "v 3"]) -> Mesh:
         own = (*own, BaseColor("relit", unlit=True))
     return dataclasses.replace(
         mesh,
-        colors=jnp.asarray(np.clip(colors, 0, 1), np.float32),
+        colors=put(np.clip(colors, 0, 1), np.float32),
         materials=own,
-        face_material=jnp.asarray(chosen, np.int32),
+        face_material=put(chosen, np.int32),
     )

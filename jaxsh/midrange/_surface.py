@@ -23,6 +23,7 @@ from .._core.checks import (
     check_vectors,
     flatten_batch,
 )
+from .._core.host import put
 from .._core.linalg import matmul
 from .._core.xla import in_turn, rows_at_once
 from ..harmonics import evaluate, evaluate_with_gradient, num_coefficients
@@ -97,7 +98,7 @@ def surface_samples(emitters: Sequence[Emitter], count: int) -> SurfaceSamples:
     if not len(areas):
         raise ValueError("surface_samples needs an emitter that gives light, got none")
     dtype = jnp.result_type(float)
-    return SurfaceSamples(*(jnp.asarray(a, dtype) for a in (points, normals, areas, radiance)))
+    return SurfaceSamples(*(put(a, dtype) for a in (points, normals, areas, radiance)))
 
 
 def project_surface(

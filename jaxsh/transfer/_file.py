@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .._core.checks import as_path, check_choice, check_type
 from .._core.files import check_place, put_in_place
+from .._core.host import put
 from .._core.npy import from_npz, text_of
 from .._core.words import reason
 from ..harmonics import degree_of
@@ -114,7 +114,7 @@ def load(path: str | os.PathLike[str]) -> Transfer | CompressedTransfer:
         arrays = {name: change(arrays[name]) for name in kind.fields if name in arrays}
         if problem := _problem(kind, arrays):
             raise ValueError(f"{path}: damaged: {problem}")
-    return kind.form(**{name: jnp.asarray(arrays[name]) for name in kind.fields}, **said)
+    return kind.form(**{name: put(arrays[name]) for name in kind.fields}, **said)
 
 
 def _kind(path: Path, surface: np.ndarray, cosine: np.ndarray) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
+from ..._core.host import put
 from ..._core.linalg import matmul
 from ...geometry import EmbreeRayScene, RayScene
 from ._directions import Directions
@@ -42,13 +43,13 @@ class Lights(NamedTuple):
 
 def bundle_of(vectors: Float[np.ndarray, "d 3"]) -> Bundle:
     """Prepare directions for `bounced`."""
-    return Bundle(jnp.asarray(vectors.T), in_fours(vectors.astype(np.float32)))
+    return Bundle(put(vectors.T), in_fours(vectors.astype(np.float32)))
 
 
 def lights_of(directions: Directions) -> Lights:
     """Prepare directions for `shadowed`."""
     vectors, basis, nearest, around = directions
-    return Lights(bundle_of(vectors), jnp.asarray(basis), nearest, around)
+    return Lights(bundle_of(vectors), put(basis), nearest, around)
 
 
 def in_fours(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 4"]:

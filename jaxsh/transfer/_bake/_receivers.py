@@ -3,17 +3,17 @@
 import math
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ...geometry import Mesh, Surface
 from ...harmonics import clamped_cosine, convolve, evaluate, num_coefficients
+from ...harmonics._polynomials import solid_rows
 
 # Faces cancel where the sum of their area vectors is but the rounding of its terms.
 _CANCELLED = 8 * np.finfo(np.float32).eps
-_UP, _BLOCK = np.array([0, 0, 1]), 256
+_UP = np.array([0, 0, 1])
 
 
 class Receivers(NamedTuple):
@@ -53,15 +53,9 @@ def unshadowed(normals: Float[Array, "m 3"], degree: int, cosine: bool) -> Float
 
 
 def basis_at(vectors: Float[np.ndarray, "n 3"], degree: int) -> Float[np.ndarray, "n k"]:
-    """Evaluate y_i at each vector in blocks: one compiled program serves any number of them."""
-    blocks = -(-len(vectors) // _BLOCK)
-    padded = np.tile(_UP.astype(vectors.dtype), (blocks * _BLOCK, 1))
-    padded[: len(vectors)] = vectors
-    basis = [_evaluate(block, degree) for block in padded.reshape(blocks, _BLOCK, 3)]
-    return np.concatenate(basis)[: len(vectors)]
-
-
-_evaluate = jax.jit(evaluate, static_argnums=1)
+    """Evaluate y_i at each unit vector, in NumPy and in double precision: no program to compile."""
+    rows = solid_rows(*vectors.T.astype(np.float64), degree)
+    return np.stack(rows, axis=-1).astype(vectors.dtype)
 
 
 def unit_normals(mesh: Mesh) -> Float[np.ndarray, "v 3"]:
