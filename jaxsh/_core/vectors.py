@@ -15,7 +15,7 @@ def components_first(vectors: Float[Array, "*batch 3"]) -> Float[Array, "3 1 n"]
 
 
 @jax.custom_jvp
-def normalize(s: Float[Array, "3 1 n"]) -> tuple[Float[Array, "3 1 n"], Float[Array, "1 n"]]:
+def normalize(s: Float[Array, "3 a b"]) -> tuple[Float[Array, "3 a b"], Float[Array, "a b"]]:
     """Unit vectors and the reciprocals of the vectors' lengths, components first.
 
     Sums are written out and √(1/a) is not 1/√a: on the CPU, XLA's reductions over three rows and
@@ -43,7 +43,7 @@ def _normalize_jvp(primals, tangents):
     return (unit, inverse_length), (jnp.stack(turned), -(along * inverse_length) * inverse_length)
 
 
-def _dot(a: Float[Array, "3 1 n"], b: Float[Array, "3 1 n"]) -> Float[Array, "1 n"]:
+def _dot(a: Float[Array, "3 a b"], b: Float[Array, "3 a b"]) -> Float[Array, "a b"]:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 

@@ -1,4 +1,4 @@
-"""Real spherical harmonics: the basis, rotation, products, kernels, windows, conventions.
+"""Real spherical harmonics: the basis, sums, rotation, products, kernels, windows, conventions.
 
 Orthonormal, no Condon–Shortley phase, index i = l(l+1) + m, coefficients on the last axis. A
 function of degree L has K = (L+1)² coefficients. Directions are x, y, z.
@@ -12,6 +12,7 @@ from ._dering import dering
 from ._indexing import degree_of, degrees, index, num_coefficients, orders
 from ._products import gaunt, product, product_matrix, triple_integral
 from ._rotation import rotate, rotate_z, rotation_matrix
+from ._synthesize import synthesize
 from ._tables import legendre
 from ._windows import damping, softening, window
 from ._zonal import clamped_cosine, convolve, disc, phong
@@ -41,6 +42,7 @@ __all__ = [
     "rotate_z",
     "rotation_matrix",
     "softening",
+    "synthesize",
     "triple_integral",
     "window",
 ]

@@ -40,6 +40,17 @@ def test_the_basis_where_the_second_axis_is_sharded(rng):
     check_sharded(everything, (directions,), (SECOND,), out)
 
 
+def test_sums_over_the_basis(rng):
+    def everything(c, d, second):
+        one, each = harmonics.synthesize(c[0], d), harmonics.synthesize(c, d)
+        slope = jax.grad(lambda c, d: jnp.sum(harmonics.synthesize(c, d) ** 2), (0, 1))(c, d)
+        return one, each, slope, harmonics.synthesize(c[0], second)
+
+    c, second = rng.normal(size=(COUNT, 2, 9)), rng.normal(size=(3, COUNT, 3))
+    arguments = c, rng.normal(size=(COUNT, 3)), second
+    check_sharded(everything, arguments, (ROWS, ROWS, SECOND), (ROWS, ROWS, ROWS, SECOND))
+
+
 @pytest.mark.slow
 def test_rotations(rng):
     def of_functions(f, rotations, angles):

@@ -26,5 +26,9 @@ def calls():
         "rotate_z": of(h.rotate_z, rows, floats(V)),
         "rotation_matrix": of(lambda r: h.rotation_matrix(r, DEGREE), floats(100, 3, 3)),
         "softening": of(lambda s: h.softening(s, DEGREE), floats(V)),
+        "synthesize": of(h.synthesize, floats(V, 3, 16), vectors),
+        "synthesize, of high degree": of(h.synthesize, floats(V, 3, K), vectors),
+        "synthesize, shared": of(h.synthesize, floats(3, 16), vectors),
+        "synthesize, shared, of high degree": of(h.synthesize, light, vectors),
         "triple_integral": of(h.triple_integral, rows, rows, rows),
     }

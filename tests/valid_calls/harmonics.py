@@ -48,6 +48,7 @@ def calls():
         "rotate_z": of(h.rotate_z, coefficients=f, angle=floats()),
         "rotation_matrix": of(h.rotation_matrix, rotation=np.eye(3), degree=2, finite="rotation"),
         "softening": of(h.softening, strength=np.array(0.5), degree=2),
+        "synthesize": of(h.synthesize, coefficients=floats(5, 2, K), vectors=vectors),
         "triple_integral": of(h.triple_integral, f=f, g=f, h=f),
         "window": of(h.window, kind="hann", degree=2),
     }

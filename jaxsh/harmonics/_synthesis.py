@@ -1,0 +1,158 @@
+"""Sums over coefficients of low degree, written out, and rules for their derivatives.
+
+The rows of the basis are polynomials that XLA fuses into the sum. Differentiated as they stand they
+would be sums over directions or coefficients inside of such a fusion, which XLA's CPU backend does
+one number at a time: so each derivative is said in the form that is fast, forward and transposed.
+"""
+
+import functools
+from collections.abc import Iterable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.custom_derivatives import SymbolicZero
+from jaxtyping import Array, Float
+
+from .._core.host import read_only_cache
+from .._core.linalg import einsum
+from .._core.xla import materialize
+from ._indexing import degree_of
+from ._polynomials import solid_rows
+from ._tables import azimuth_table, gradient_table, zenith_table
+
+
+@jax.custom_jvp
+def per_point(
+    coefficients: Float[Array, "n c k"], unit: Float[Array, "3 n 1"]
+) -> Float[Array, "n c"]:
+    """Σ_k c[n, :, k] y_k, each unit vector with coefficients of its own."""
+    rows = solid_rows(*unit, degree_of(coefficients.shape[-1]))
+    return _sum(coefficients[:, :, k] * row for k, row in enumerate(rows))
+
+
+@jax.custom_jvp
+def shared(coefficients: Float[Array, "c k"], unit: Float[Array, "3 n 1"]) -> Float[Array, "n c"]:
+    """Σ_k c[:, k] y_k, the same functions at all unit vectors."""
+    rows = solid_rows(*unit, degree_of(coefficients.shape[-1]))
+    return _sum(coefficients[None, :, k] * row for k, row in enumerate(rows))
+
+
+@functools.partial(per_point.defjvp, symbolic_zeros=True)
+def _per_point_jvp(primals, tangents):
+    return per_point(*primals), _change("nck,nk->nc", _turn_each, primals, tangents)
+
+
+@functools.partial(shared.defjvp, symbolic_zeros=True)
+def _shared_jvp(primals, tangents):
+    return shared(*primals), _change("ck,nk->nc", _turn_shared, primals, tangents)
+
+
+def _change(subscripts: str, turned, primals, tangents) -> Float[Array, "n c"]:
+    """The sum's tangent: of changed coefficients, and of turned vectors."""
+    (coefficients, unit), (change, turn) = primals, tangents
+    degree = degree_of(coefficients.shape[-1])
+
+    def changed(change, unit):
+        return einsum(subscripts, change, _basis(_stored(unit), degree))
+
+    parts = []
+    if not isinstance(change, SymbolicZero):
+        parts.append(_anew(changed)(change, unit))
+    if degree and not isinstance(turn, SymbolicZero):
+        parts.append(_anew(turned)(turn, coefficients, unit))
+    count = unit.shape[1], coefficients.shape[-2]
+    return _sum(parts) if parts else jnp.zeros(count, coefficients.dtype)
+
+
+def _anew(function):
+    """In reverse mode made anew from its arguments, rather than kept."""
+    return jax.checkpoint(function, prevent_cse=False)
+
+
+def _turn_each(turn, coefficients, unit):
+    """Σ_k c[n, :, k] ∂y_k along `turn`."""
+    degree = degree_of(coefficients.shape[-1])
+    rows = solid_rows(*unit[..., 0], degree - 1)
+    along = _components(turn, unit)
+    terms = _terms(degree)
+    slopes = [jnp.zeros_like(rows[0])]  # of the constant
+    for k in range(1, (degree + 1) ** 2):
+        slopes.append(
+            _sum(
+                float(factor[axis, k]) * rows[row[axis, k]] * along[axis]
+                for row, factor in terms
+                for axis in range(3)
+                if factor[axis, k]
+            )
+        )
+    return einsum("nck,nk->nc", coefficients, jnp.stack(slopes, axis=-1))
+
+
+def _turn_shared(turn, coefficients, unit):
+    """Σ_k c[:, k] ∂y_k along `turn`: along each axis a sum of one degree less."""
+    degree = degree_of(coefficients.shape[-1])
+    slopes = einsum("ck,akj->acj", coefficients, jnp.asarray(_gradient(degree), turn.dtype))
+    rows = solid_rows(*unit[..., 0], degree - 1)
+    along = _components(turn, unit)
+    columns = [
+        _sum(
+            along[axis] * _sum(slopes[axis, c, j] * row for j, row in enumerate(rows))
+            for axis in range(3)
+        )
+        for c in range(len(coefficients))
+    ]
+    return jnp.stack(columns, axis=-1)
+
+
+def _components(turn, unit) -> list[Float[Array, " n"]]:
+    """x, y and z of `turn`, whose transpose is one array and stands in memory.
+
+    What turns a normal's derivative into a vector's takes each component three times: fused, it
+    would make each anew.
+    """
+    turn = materialize(lambda _, turn: turn[..., 0].T, unit, turn)
+    return [column[:, 0] for column in jax.lax.split(turn, (1, 1, 1), axis=1)]
+
+
+def _stored(unit):
+    return materialize(lambda unit: unit, unit)
+
+
+def _basis(unit: Float[Array, "3 n 1"], degree: int) -> Float[Array, "n k"]:
+    """The basis, coefficients last: all rows have one form (see `_tables`), side by side."""
+    x, y, z = unit
+    table = zenith_table(degree)
+
+    def constants(array):
+        return jnp.asarray(array, x.dtype)[..., None, :]
+
+    u = z * z - 0.5
+    lone, *factors = (np.concatenate(list(t))[table.azimuth_row].T for t in azimuth_table(degree))
+    a, b, c, d = constants(lone)
+    basis = (a + b * x + (c + d * x) * y) * (constants(table.e) * z + constants(table.f))
+    for alpha, beta, gamma in zip(*map(constants, factors), strict=True):
+        basis = basis * (alpha * (x * x) + beta * (y * y) + gamma)
+    for first, *rest in constants(table.factors):
+        basis = basis * functools.reduce(lambda value, b: value * u + b, rest, first)
+    return basis
+
+
+@read_only_cache(maxsize=None)
+def _gradient(degree: int) -> Float[np.ndarray, "3 k j"]:
+    """∂_axis (r^l y_k) = Σ_j gradient[axis, k, j] y_j, of one degree less."""
+    matrix = np.zeros((3, (degree + 1) ** 2, degree**2))
+    for row, factor in _terms(degree):
+        for axis, k in zip(*np.nonzero(factor), strict=True):
+            matrix[axis, k, row[axis, k]] += factor[axis, k]
+    return matrix
+
+
+def _terms(degree: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The two terms of each derivative: rows of the basis, and factors."""
+    table = gradient_table(degree)
+    return [(table.first_row, table.first), (table.second_row, table.second)]
+
+
+def _sum(terms: Iterable[Array]) -> Array:
+    return functools.reduce(jnp.add, terms)
