@@ -27,14 +27,14 @@ def per_point(
     coefficients: Float[Array, "n c k"], unit: Float[Array, "3 n 1"]
 ) -> Float[Array, "n c"]:
     """Σ_k c[n, :, k] y_k, each unit vector with coefficients of its own."""
-    rows = solid_rows(*unit, degree_of(coefficients.shape[-1]))
+    rows = _rows(unit, degree_of(coefficients.shape[-1]))
     return _sum(coefficients[:, :, k] * row for k, row in enumerate(rows))
 
 
 @jax.custom_jvp
 def shared(coefficients: Float[Array, "c k"], unit: Float[Array, "3 n 1"]) -> Float[Array, "n c"]:
     """Σ_k c[:, k] y_k, the same functions at all unit vectors."""
-    rows = solid_rows(*unit, degree_of(coefficients.shape[-1]))
+    rows = _rows(unit, degree_of(coefficients.shape[-1]))
     return _sum(coefficients[None, :, k] * row for k, row in enumerate(rows))
 
 
@@ -59,10 +59,15 @@ def _change(subscripts: str, turned, primals, tangents) -> Float[Array, "n c"]:
     parts = []
     if not isinstance(change, SymbolicZero):
         parts.append(_anew(changed)(change, unit))
-    if degree and not isinstance(turn, SymbolicZero):
+    if degree and coefficients.size and not isinstance(turn, SymbolicZero):
         parts.append(_anew(turned)(turn, coefficients, unit))
     count = unit.shape[1], coefficients.shape[-2]
     return _sum(parts) if parts else jnp.zeros(count, coefficients.dtype)
+
+
+def _rows(unit, degree: int) -> list[Array]:
+    x, y, z = unit
+    return solid_rows(x, y, z, degree)
 
 
 def _anew(function):
@@ -73,7 +78,7 @@ def _anew(function):
 def _turn_each(turn, coefficients, unit):
     """Σ_k c[n, :, k] ∂y_k along `turn`."""
     degree = degree_of(coefficients.shape[-1])
-    rows = solid_rows(*unit[..., 0], degree - 1)
+    rows = _rows(unit[..., 0], degree - 1)
     along = _components(turn, unit)
     terms = _terms(degree)
     slopes = [jnp.zeros_like(rows[0])]  # of the constant
@@ -93,7 +98,7 @@ def _turn_shared(turn, coefficients, unit):
     """Σ_k c[:, k] ∂y_k along `turn`: along each axis a sum of one degree less."""
     degree = degree_of(coefficients.shape[-1])
     slopes = einsum("ck,akj->acj", coefficients, jnp.asarray(_gradient(degree), turn.dtype))
-    rows = solid_rows(*unit[..., 0], degree - 1)
+    rows = _rows(unit[..., 0], degree - 1)
     along = _components(turn, unit)
     columns = [
         _sum(

@@ -110,7 +110,7 @@ def _per_point(coefficients, vectors):
         return jnp.sum(jnp.multiply(*align(coefficients, basis[..., None, :])), axis=-1)
     batch = jnp.broadcast_shapes(coefficients.shape[:-2], vectors.shape[:-1])
     flat = jnp.broadcast_to(coefficients, (*batch, *coefficients.shape[-2:]))
-    flat = flat.reshape(-1, *coefficients.shape[-2:])
+    flat = flat.reshape(math.prod(batch), *coefficients.shape[-2:])
     vectors = jnp.broadcast_to(vectors, (*batch, 3)).reshape(-1, 3)
     if degree <= _LOW_DEGREE:
         values = per_point(flat, _units(vectors))

@@ -41,14 +41,15 @@ def test_the_basis_where_the_second_axis_is_sharded(rng):
 
 
 def test_sums_over_the_basis(rng):
-    def everything(c, d, second):
-        one, each = harmonics.synthesize(c[0], d), harmonics.synthesize(c, d)
-        slope = jax.grad(lambda c, d: jnp.sum(harmonics.synthesize(c, d) ** 2), (0, 1))(c, d)
-        return one, each, slope, harmonics.synthesize(c[0], second)
+    def everything(one, each, d, second):
+        values = harmonics.synthesize(one, d), harmonics.synthesize(each, d)
+        slope = jax.grad(lambda c, d: jnp.sum(harmonics.synthesize(c, d) ** 2), (0, 1))(each, d)
+        return *values, *slope, harmonics.synthesize(one, second)
 
-    c, second = rng.normal(size=(COUNT, 2, 9)), rng.normal(size=(3, COUNT, 3))
-    arguments = c, rng.normal(size=(COUNT, 3)), second
-    check_sharded(everything, arguments, (ROWS, ROWS, SECOND), (ROWS, ROWS, ROWS, SECOND))
+    one, each = rng.normal(size=(2, 4)), rng.normal(size=(COUNT, 2, 4))
+    arguments = one, each, rng.normal(size=(COUNT, 3)), rng.normal(size=(3, COUNT, 3))
+    specs = WHOLE, ROWS, ROWS, SECOND
+    check_sharded(everything, arguments, specs, (ROWS, ROWS, ROWS, ROWS, SECOND))
 
 
 @pytest.mark.slow
