@@ -6,19 +6,19 @@ W·H·(2L+1) multiplications in place of W·H·K, in one product that reads the 
 """
 
 import functools
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float, Int
+from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import as_float, check_coefficients, check_degree, check_size
 from .._core.host import read_only_cache
 from .._core.linalg import einsum
 from .._core.pictures import as_radiance, check_result, check_shape
-from .._core.xla import keep_rows, on_mesh
+from .._core.xla import keep_rows
 from ..harmonics import degree_of, degrees, legendre, orders
+from ._folds import Kind, of_rows, sums_along_columns
 from ._quadrature import fejer_weights
 
 
@@ -91,13 +91,13 @@ def _project(image, degree: int):
     weighted = waves * (fejer_weights(height) * 2 * np.pi / width)
 
     def sums(image):
-        dtype = image.dtype
-        columns = _of_rows("hk,h...->k...", weighted.T.astype(dtype), image)
         parts = []
-        for kind in kinds:
-            some = jnp.swapaxes(columns[kind.waves], 1, 2)  # so that columns are summed as they lie
-            moments = einsum("kcw,mw->kcm", some, kind.azimuths.astype(dtype))
-            parts.append(einsum("kcm,mlk->cml", moments, kind.meridians.astype(dtype)))
+        for kind, some in zip(kinds, sums_along_columns(image, weighted, kinds), strict=True):
+            some = jnp.swapaxes(some, 1, 2)  # so that columns are summed as they lie
+            azimuths = kind.azimuths[:, : some.shape[2]].astype(image.dtype)
+            moments = einsum("kcw,mw->kcm", some, azimuths)
+            meridians = kind.meridians.astype(image.dtype)
+            parts.append(einsum("kcm,mlk->cml", moments, meridians))
         return jnp.concatenate(parts, axis=1)
 
     def over_columns(image):
@@ -122,33 +122,13 @@ def _reconstruct(coefficients, height: int, width: int):
         moments = einsum("cml,mlk->kcm", coefficients[:, place], kind.meridians.astype(dtype))
         some = einsum("kcm,mw->kcw", moments, kind.azimuths.astype(dtype))
         columns.append(jnp.swapaxes(some, 1, 2))
-    return _of_rows("hk,k...->h...", waves.T.astype(dtype), jnp.concatenate(columns))
-
-
-def _of_rows(
-    subscripts: str, factors: ArrayLike, rows: Float[Array, "r w c"]
-) -> Float[Array, "s w c"]:
-    """Sums of rows with factors: one product over columns and channels as they lie in memory."""
-    if on_mesh(rows):  # flat, columns and channels would lose their sharding
-        return einsum(subscripts, factors, rows)
-    # Flat, the derivative is such a product too. XLA would transpose the picture that it makes.
-    flat = einsum(subscripts, factors, rows.reshape(len(rows), -1))
-    return flat.reshape(len(flat), *rows.shape[1:])
-
-
-class _Kind(NamedTuple):
-    """The orders that are even, or odd: their meridians are sums of cosines, or of sines."""
-
-    orders: Int[np.ndarray, " m"]
-    waves: slice  # of the table of waves
-    meridians: Float[np.ndarray, "m l k"]  # coefficients of the waves; zero where l < |m|
-    azimuths: Float[np.ndarray, "m w"]  # cos mφ, or sin |m|φ where m < 0
+    return of_rows("hk,k...->h...", waves.T.astype(dtype), jnp.concatenate(columns))
 
 
 @read_only_cache(maxsize=32)
 def _tables(
     height: int, width: int, degree: int
-) -> tuple[Float[np.ndarray, "waves h"], tuple[_Kind, ...]]:
+) -> tuple[Float[np.ndarray, "waves h"], tuple[Kind, ...]]:
     """Waves along a meridian, cos kθ for k = 0..L and sin kθ for k = 1..L; and what they make."""
     count = degree + 1
     nodes = (np.arange(count) + 0.5) * np.pi / count  # here the waves are orthogonal
@@ -157,15 +137,18 @@ def _tables(
     values[orders(degree) + degree, degrees(degree)] = legendre(np.cos(nodes), degree)
     at_nodes, all_orders, kinds = _waves(nodes, degree), np.arange(-degree, degree + 1), []
     for parity, waves in enumerate([slice(count), slice(count, None)][: min(count, 2)]):
+        mirrored = (count - parity + 1) // 2
         some = all_orders[all_orders % 2 == parity]
         meridians = values[some + degree] @ at_nodes[waves].T
         meridians /= (at_nodes[waves] ** 2).sum(axis=1)
         m = some[:, None]
         azimuths = np.where(m < 0, np.sin(-m * phi), np.cos(m * phi))
-        kinds.append(_Kind(some, waves, meridians, azimuths))
+        kinds.append(Kind(some, waves, mirrored, meridians, azimuths))
     return _waves((np.arange(height) + 0.5) * np.pi / height, degree), tuple(kinds)
 
 
 def _waves(theta: Float[np.ndarray, " n"], degree: int) -> Float[np.ndarray, "waves n"]:
+    """Make cosines and sines; of each those come first that are the same at π − θ."""
     angles = np.multiply.outer(np.arange(degree + 1), theta)
-    return np.concatenate([np.cos(angles), np.sin(angles[1:])])
+    cosines, sines = np.cos(angles), np.sin(angles)
+    return np.concatenate([cosines[::2], cosines[1::2], sines[1::2], sines[2::2]])
