@@ -14,7 +14,7 @@ Rows = list[dict[str, Any]]
 
 # Each is the module of that name, with a `SECTION`. They import peers in their functions: the page
 # is made where there are none.
-NAMES = ("basis", "errors", "lat_long", "first_call", "first_picture")
+NAMES = ("basis", "synthesis", "errors", "lat_long", "first_call", "first_picture")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -21,9 +21,10 @@ from ._indexing import degree_of
 from ._synthesis import per_point, shared
 
 # Up to here sums are written out.
-_LOW_DEGREE, _FEW_FUNCTIONS = 4, 4
-# Directions per block on a CPU: 1 MB of basis at degree 10 in float32.
-_BLOCK = 2048
+_LOW_DEGREE, _FEW_FUNCTIONS = 6, 4
+# Directions per block on a CPU: 1 MB of basis at degree 10 in float32. Blocks of coefficients are
+# copied, so that of those few are better: 64 MB of basis.
+_BLOCK, _LARGE_BLOCK = 2048, 2**17
 
 
 def synthesize(
@@ -33,7 +34,7 @@ def synthesize(
 
     What shading does with the basis: the colors of a million splats, each with coefficients and a
     direction of its own, or one light at a million normals. The same as `evaluate` and a sum over
-    K, but the basis is not held, neither here nor for reverse mode.
+    K, but the basis is not held as a whole, neither here nor for reverse mode.
 
     **Arguments**
 
@@ -120,7 +121,7 @@ def _per_point(coefficients, vectors):
             return einsum("nck,nk->nc", coefficients, evaluate(vectors, degree))
 
         most = rows_at_once(math.prod(flat.shape[1:]) * flat.dtype.itemsize)
-        values = in_blocks(block, flat, vectors, size=_BLOCK, most=most)
+        values = in_blocks(block, flat, vectors, size=_LARGE_BLOCK, most=most)
     return values.reshape(*batch, coefficients.shape[-2])
 
 
