@@ -38,7 +38,7 @@ def main(start: float) -> None:
         import jax
         import jax.monitoring
 
-    def compiled(event: str, _seconds: float, **_about) -> None:
+    def compiled(event: str, duration_secs: float, **about) -> None:
         # With the persistent cache it is what the cache gives back.
         if event == "/jax/core/compile/backend_compile_duration":
             PROGRAMS.append(event)

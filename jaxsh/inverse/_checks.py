@@ -1,5 +1,6 @@
 """Checks of a fit's data before it starts, and of how it ended."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
@@ -37,14 +38,20 @@ def check_data(
     check_cosine(transfer)
     dtype, count = transfer.coefficients.dtype, len(transfer.coefficients)
     observed = as_float(observed, "observed").astype(dtype)
-    albedo = checked_albedo(albedo, count, dtype)
-    weights = None if weights is None else as_float(weights, "weights").astype(dtype)
+    albedo = as_float(checked_albedo(albedo, count, dtype), "albedo")
     if weights is None:
-        sees = jnp.any(transfer.coefficients != 0, axis=-1)
-        weights = (sees | jnp.any(transfer.normals != 0, axis=-1)).astype(dtype)
-    _check_shapes(observed, weights, count)
-    _check_values(observed, weights)
-    return observed, albedo, weights
+        weight = _where_there_is_one(transfer.coefficients, transfer.normals)
+    else:
+        weight = as_float(weights, "weights").astype(dtype)
+    _check_shapes(observed, weight, count)
+    _check_values(observed, weight)
+    return observed, albedo, weight
+
+
+@jax.jit
+def _where_there_is_one(coefficients, normals) -> Array:
+    sees = jnp.any(coefficients != 0, axis=-1)
+    return (sees | jnp.any(normals != 0, axis=-1)).astype(coefficients.dtype)
 
 
 def check_solver(tolerance: float | None, max_steps: int, throw: bool) -> None:

@@ -54,7 +54,8 @@ def unshadowed(normals: Float[Array, "m 3"], degree: int, cosine: bool) -> Float
 
 def basis_at(vectors: Float[np.ndarray, "n 3"], degree: int) -> Float[np.ndarray, "n k"]:
     """Evaluate y_i at each unit vector, in NumPy and in double precision: no program to compile."""
-    rows = solid_rows(*vectors.T.astype(np.float64), degree)
+    x, y, z = vectors.T.astype(np.float64)
+    rows = solid_rows(x, y, z, degree)
     return np.stack(rows, axis=-1).astype(vectors.dtype)
 
 
