@@ -15,14 +15,14 @@ from ..._core.host import put
 from ..._core.linalg import matmul
 from ...geometry import EmbreeRayScene, RayScene
 from ._directions import Directions
-from ._receivers import Faces, Receivers, unshadowed
+from ._receivers import Faces, Receivers, basis_at, expanded
 
 # Rows of every product: with one fixed shape a vertex's sums are added in one fixed order,
 # whatever the block it comes in.
 TILE = 64
-# Tiles in a call, each multiplied by itself: a call takes longer than the product of a small one.
-# Never another number, so that one compiled program serves all blocks.
-_TOGETHER = 4
+# Rows in a call, whose tiles are multiplied each by itself: a call takes longer than the product of
+# one. Never another number, so that one compiled program serves all.
+_BLOCK = 4 * TILE
 
 
 class Bundle(NamedTuple):
@@ -61,7 +61,14 @@ def exact_rows(
     normals: Float[np.ndarray, "rows 3"], degree: int, cosine: bool
 ) -> Float[np.ndarray, "rows k"]:
     """Compute the coefficients of points on which nothing casts a shadow."""
-    return _in_pieces(functools.partial(_exact, degree=degree, cosine=cosine), normals)
+
+    def program(part: np.ndarray) -> Array:
+        return _expanded(part, basis_at(part, degree), cosine=cosine)
+
+    return _in_pieces(program, normals)
+
+
+_expanded = jax.jit(expanded, static_argnames="cosine")
 
 
 def shadowed(
@@ -83,10 +90,12 @@ def shadowed(
     above = _in_pieces(facing, normals)
     blocked = _blocked(scene, receivers.origins[rows], lights, above)
     state = np.add(above, blocked, dtype=np.uint8)
-    given = {"across": lights.bundle.across, "basis": lights.basis}
-    return _in_pieces(
-        functools.partial(_lit, **given, degree=degree, cosine=cosine), normals, state
-    )
+
+    def program(part: np.ndarray, state: np.ndarray) -> Array:
+        own = basis_at(part, degree)
+        return _lit(part, own, state, lights.bundle.across, lights.basis, cosine=cosine)
+
+    return _in_pieces(program, normals, state)
 
 
 @functools.partial(jax.jit, static_argnames="cosine")
@@ -107,46 +116,39 @@ def _cosines(
     return x + y + z
 
 
-@functools.partial(jax.jit, static_argnames=("degree", "cosine"))
-def _exact(normals: Float[Array, "rows 3"], *, degree: int, cosine: bool) -> Float[Array, "rows k"]:
-    return lax.map(
-        lambda tile: unshadowed(tile, degree, cosine), normals.reshape(-1, TILE, 3)
-    ).reshape(len(normals), -1)
-
-
-@functools.partial(jax.jit, static_argnames=("degree", "cosine"))
+@functools.partial(jax.jit, static_argnames="cosine")
 def _lit(
     normals: Float[Array, "rows 3"],
+    own: Float[Array, "rows k"],  # y_i at the normals
     state: UInt8[Array, "rows d"],  # of a direction: 0 below the surface, 1 open, 2 blocked
     across: Float[Array, "3 d"],
     basis: Float[Array, "d k"],
     *,
-    degree: int,
     cosine: bool,
 ) -> Float[Array, "rows k"]:
-    def of_tile(tile: tuple[Array, Array]) -> Float[Array, "tile k"]:
-        normals, state = tile
+    def of_tile(tile: tuple[Array, Array, Array]) -> Float[Array, "tile k"]:
+        normals, own, state = tile
         lost = jnp.where(state == 2, _cosines(normals, across, cosine=cosine), 0)
-        rows = unshadowed(normals, degree, cosine) - matmul(lost, basis)
+        rows = expanded(normals, own, cosine=cosine) - matmul(lost, basis)
         dark = jnp.all(state != 1, axis=1) & jnp.any(state == 2, axis=1)
         return jnp.where(dark[:, None], 0, rows)
 
-    tiles = normals.reshape(-1, TILE, 3), state.reshape(-1, TILE, state.shape[1])
-    return lax.map(of_tile, tiles).reshape(len(normals), -1)
+    tiles = (array.reshape(-1, TILE, array.shape[1]) for array in (normals, own, state))
+    return lax.map(of_tile, tuple(tiles)).reshape(len(normals), -1)
 
 
 def _in_pieces(program: Callable[..., Any], *arrays: np.ndarray) -> np.ndarray:
-    """Run a program on `_TOGETHER` tiles of the arrays' rows at a time, the last filled with zeros.
+    """Run a program on `_BLOCK` rows of the arrays at a time, the last ones filled up with zeros.
 
     By XLA, whose threads yield the cores while idle; OpenBLAS's spin, and take them from the rays.
     """
-    size, count = TILE * _TOGETHER, len(arrays[0])
+    count = len(arrays[0])
     found = []
-    for start in range(0, count, size):
-        rows = [array[start : start + size] for array in arrays]
+    for start in range(0, count, _BLOCK):
+        rows = [array[start : start + _BLOCK] for array in arrays]
         some = len(rows[0])
-        if some < size:
-            rows = [np.pad(part, ((0, size - some), (0, 0))) for part in rows]
+        if some < _BLOCK:
+            rows = [np.pad(part, ((0, _BLOCK - some), (0, 0))) for part in rows]
         found.append(np.asarray(program(*rows))[:some])
     return found[0] if len(found) == 1 else np.concatenate(found)
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ...geometry import Mesh, Surface
-from ...harmonics import clamped_cosine, convolve, evaluate, num_coefficients
+from ...harmonics import clamped_cosine, convolve, evaluate
 from ...harmonics._polynomials import solid_rows
 
 # Faces cancel where the sum of their area vectors is but the rounding of its terms.
@@ -38,18 +38,26 @@ def faces_of(mesh: Mesh) -> Faces:
 
 
 def unshadowed(normals: Float[Array, "m 3"], degree: int, cosine: bool) -> Float[Array, "m k"]:
+    """Give the coefficients of points on which nothing casts a shadow; see `expanded`."""
+    defined = jnp.any(normals != 0, axis=1, keepdims=True)
+    up = jnp.asarray(_UP, normals.dtype)[None]
+    return expanded(normals, evaluate(jnp.where(defined, normals, up), degree), cosine=cosine)
+
+
+def expanded(
+    normals: Float[Array, "m 3"], basis: Float[Array, "m k"], *, cosine: bool
+) -> Float[Array, "m k"]:
     """Expand the clamped cosine about each unit normal: λ_l y_lm(n), zero about a zero normal.
 
-    Without it the whole sphere, whose only coefficient is √4π. In JAX, for a larger program.
+    `basis` is y_lm(n). Without cosine the whole sphere, whose only coefficient is √4π.
     """
-    defined = jnp.any(normals != 0, axis=1, keepdims=True)
-    if not cosine:
-        whole = np.zeros((1, num_coefficients(degree)))
+    if cosine:
+        exact = convolve(basis, clamped_cosine(math.isqrt(basis.shape[1]) - 1))
+    else:
+        whole = np.zeros((1, basis.shape[1]))
         whole[0, 0] = math.sqrt(4 * math.pi)
-        return jnp.where(defined, jnp.asarray(whole, normals.dtype), 0)
-    up = jnp.asarray(_UP, normals.dtype)[None]
-    exact = convolve(evaluate(jnp.where(defined, normals, up), degree), clamped_cosine(degree))
-    return jnp.where(defined, exact, 0)
+        exact = jnp.asarray(whole, normals.dtype)
+    return jnp.where(jnp.any(normals != 0, axis=1, keepdims=True), exact, 0)
 
 
 def basis_at(vectors: Float[np.ndarray, "n 3"], degree: int) -> Float[np.ndarray, "n k"]:
