@@ -38,7 +38,8 @@ def split(
 
     Returns an order of the members, tile by tile; each tile's number of blocks; and its mean B.
     """
-    rows = np.concatenate([axis, weights[None]]).astype(np.float32).reshape(4, -1, block)
+    rows = np.empty((4, len(weights) // block, block), np.float32)
+    rows.reshape(4, -1)[:] = *axis, weights
     order = np.arange(len(weights), dtype=np.int32).reshape(-1, block)
     one = (np.array([value]) for value in (0, len(order), np.inf, -1, False))
     nodes = _Nodes(*one)

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
 from .._core.checks import as_host_float, check_flag, check_size, check_type
+from .._core.xla import materialize
 from ..transfer import Transfer
 from ..transfer._glossy_kernels import checked_eye, mirrored, rows_of
 from ._method import check_known
@@ -104,7 +105,8 @@ def make_tiling(
 def _seen(eye, positions, normals, areas, distant) -> Float[Array, "v 4"]:
     """Tells where each vertex mirrors the eye, and what it weighs."""
     positions, normals = rows_of(positions, normals)
-    axis = mirrored(eye, positions, normals, distant)
+    # Once: below it has two uses, and each would compute it anew for every component.
+    axis = materialize(lambda *seen: mirrored(*seen, distant), eye, positions, normals)
     weights = areas * (jnp.maximum(jnp.sum(normals * axis, axis=0), 0) + 0.05)
     return jnp.concatenate([axis, weights[None].astype(axis.dtype)]).T
 
