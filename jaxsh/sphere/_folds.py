@@ -16,9 +16,9 @@ from .._core.linalg import einsum
 from .._core.xla import on_mesh
 
 # On a CPU up to this degree, folding takes longer than what it saves.
-_DEGREE = 12
-# Numbers of each of the four folds of a block, which are to stay in cache, and its least columns.
-_BLOCK, _COLUMNS = 2**17 + 2**16, 16
+_DEGREE = 20
+# Numbers of each of the four folds of a block, which is to stay in cache, and its least columns.
+_BLOCK, _COLUMNS = 2**18 + 2**17, 16
 
 
 class Kind(NamedTuple):
@@ -26,9 +26,7 @@ class Kind(NamedTuple):
 
     orders: Int[np.ndarray, " m"]
     waves: slice  # of the table of waves
-    mirrored: (
-        int  # how many of these, the first, are the same below the equator; the others change sign
-    )
+    mirrored: int  # of these, the first so many are the same at π − θ; the others change sign
     meridians: Float[np.ndarray, "m l k"]  # coefficients of the waves; zero where l < |m|
     azimuths: Float[np.ndarray, "m w"]  # cos mφ, or sin |m|φ where m < 0
 
