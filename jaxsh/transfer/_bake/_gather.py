@@ -130,7 +130,8 @@ def _lit(
         normals, own, state = tile
         lost = jnp.where(state == 2, _cosines(normals, across, cosine=cosine), 0)
         rows = expanded(normals, own, cosine=cosine) - matmul(lost, basis)
-        dark = jnp.all(state != 1, axis=1) & jnp.any(state == 2, axis=1)
+        # Something is blocked and nothing open; in one reduction, as 3 for open.
+        dark = jnp.max(jnp.where(state == 1, np.uint8(3), state), axis=1) == 2
         return jnp.where(dark[:, None], 0, rows)
 
     tiles = (array.reshape(-1, TILE, array.shape[1]) for array in (normals, own, state))
