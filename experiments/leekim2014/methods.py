@@ -29,7 +29,7 @@ DIFFUSE, EIGHT_BITS = "diffuse", "diffuse, eight bits"
 _BURST = 3  # frames of one way, before the next takes its turn
 _TILE = 1024  # vertices of the product form's tiles
 TURN = 0.05  # of the light from frame to frame, in radians
-TURNS = 12  # of the light around the vertical, among which the worst error is sought
+TURNS = 21  # of the light around the vertical, among which the worst error is sought
 
 Light = Float[Array, "3 k"]
 Way = Callable[[Light], Any]

@@ -37,8 +37,8 @@ def shade(
       products with the light's matrix, not against `transfer.shade_glossy`.
     - `Anchors()`, "anchors": glossy light at anchor vertices, interpolated where it is smooth.
       Somewhat faster than `transfer.shade_glossy`.
-    - `Tiles()`, "tiles": sums over few directions about the reflected one. Pays against all of
-      them.
+    - `Tiles()`, "tiles": sums of few numbers a vertex, whose weights change smoothly with the
+      reflected direction. Pays against all of them.
 
     **Arguments**
 

@@ -17,7 +17,7 @@ from ._method import check_known
 from ._sharing import sharing
 from ._tile_samples import places
 from ._tile_set import TileSet
-from ._tiles import DIRECTIONS, EXPONENT, arrange, arranged_in_slices
+from ._tiles import COMPONENTS, EXPONENT, arrange, arranged_in_slices
 from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling, vertex_areas
 
 # Slices of a set on an accelerator: at 50,000 vertices and degree 10 one is some 3,000 vertices.
@@ -45,7 +45,7 @@ class TileAtlas(eqx.Module):
     axes: Float[Array, "views tiles 3"]
     eyes: Float[Array, "views 3"]  # directions from the center to each eye
     center: Float[Array, " 3"]  # of the mesh's box; zero where the eyes are far away
-    directions: int = eqx.field(static=True)
+    components: int = eqx.field(static=True)
     exponent: float = eqx.field(static=True)
 
     def view(self, eye: Float[ArrayLike, " 3"]) -> int:
@@ -79,7 +79,7 @@ class TileAtlas(eqx.Module):
         return arrange(
             transfer,
             self.tiling(view),
-            directions=self.directions,
+            components=self.components,
             exponent=self.exponent,
             diffuse=diffuse,
         )
@@ -92,7 +92,7 @@ def make_tile_atlas(
     views: int = 128,
     num_tiles: int = NUM_TILES,
     block: int = BLOCK,
-    directions: int = DIRECTIONS,
+    components: int = COMPONENTS,
     exponent: float = EXPONENT,
 ) -> TileAtlas:
     """Make tilings for `views` directions, spread evenly over the sphere.
@@ -107,9 +107,9 @@ def make_tile_atlas(
     >>> made = transfer.unshadowed(points, points, degree=2)
     >>> atlas = adaptive.make_tile_atlas(made, views=3, num_tiles=2, block=16)
     >>> atlas.nearest(made, atlas.eyes[1]).samples.shape
-    (4, 26, 16)
+    (4, 9, 16)
     """
-    check_rule(directions, exponent)
+    check_rule(components, exponent)
     check_type("transfer", transfer, Transfer)
     check_known("make_tile_atlas", transfer)
     views = check_size("views", views)
@@ -131,7 +131,7 @@ def make_tile_atlas(
         jnp.stack([getattr(one, name) for one in tilings])
         for name in ("permutation", "tile", "axes")
     )
-    return TileAtlas(permutation, tile, axes, towards, center, directions, exponent)
+    return TileAtlas(permutation, tile, axes, towards, center, components, exponent)
 
 
 class TileFollower:
@@ -217,7 +217,7 @@ class TileFollower:
             place = places(self._permutation[view], made.num_points, None)
         else:
             place = self._places[view]
-        rule = local_rule(made.degree, atlas.directions, atlas.exponent)
+        rule = local_rule(made.degree, atlas.components, atlas.exponent)
         return arranged_in_slices(
             made, atlas.tiling(view), place, rule, self._diffuse, self._slices
         )

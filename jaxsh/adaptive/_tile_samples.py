@@ -1,4 +1,4 @@
-"""A transfer sampled in the order of a tiling: all of it at once, or a slice of its blocks."""
+"""A transfer in the order of a tiling, in few numbers: all at once, or a slice of its blocks."""
 
 import functools
 
@@ -9,14 +9,14 @@ from jaxtyping import Array, Float, Int
 
 from .._core.linalg import matmul
 from .._core.xla import in_turn, rows_at_once
-from ..harmonics import evaluate, rotate
+from ..harmonics import rotate
 from ..transfer._glossy_kernels import in_steps, rows_of
 from ._sharing import Shared, made_of_rows, on_rows, own
 
 # Along which axis the rows of a device stand in a transfer, a tiling and a rule, and in what
 # `outlined` gives beside its weights.
 _GIVEN = (0, 0, None, None)
-_OUTLINE = (0, 1, 1, 1)
+_OUTLINE = (1, 1, 1)
 
 
 def places(
@@ -46,18 +46,18 @@ def places(
 
 
 @functools.partial(jax.jit, static_argnames=("quantized", "shared"))
-def arrange_all(transfer, tiling, directions, rows, quantized, shared=None):
-    def arrange(transfer, tiling, directions, rows):
-        rows, *outline = _outlined(transfer, tiling, directions, rows)
+def arrange_all(transfer, tiling, lights, rows, quantized, shared=None):
+    def arrange(transfer, tiling, lights, rows):
+        rows, *outline = _outlined(transfer, tiling, lights, rows)
         return *_sampled(transfer.coefficients, _own(transfer, tiling), rows, quantized), *outline
 
-    return on_rows(arrange, shared, _GIVEN, (0, 0, *_OUTLINE), transfer, tiling, directions, rows)
+    return on_rows(arrange, shared, _GIVEN, (0, 0, *_OUTLINE), transfer, tiling, lights, rows)
 
 
 @functools.partial(jax.jit, static_argnames="shared")
-def outlined(transfer, tiling, directions, rows, shared):
+def outlined(transfer, tiling, lights, rows, shared):
     """All but the samples, and the weights that these are sums with."""
-    given = transfer, tiling, directions, rows
+    given = transfer, tiling, lights, rows
     return on_rows(_outlined, shared, _GIVEN, (0, *_OUTLINE), *given)
 
 
@@ -67,14 +67,12 @@ def _own(transfer, tiling):
     return permutation, own(tiling.tile, len(tiling.axes))
 
 
-def _outlined(transfer, tiling, directions, rows):
-    turns = _turns(tiling.axes)
-    directions = matmul(directions[None], jnp.swapaxes(turns, 1, 2))
-    rows = rotate(rows, turns[:, None])
-    basis = evaluate(directions, transfer.degree, axis=0)
+def _outlined(transfer, tiling, lights, rows):
+    both = rotate(jnp.concatenate([rows, lights]), turns(tiling.axes)[:, None])
+    rows, lights = both[:, : len(rows)], jnp.moveaxis(both[:, len(rows) :], 2, 0)
     order = _own(transfer, tiling)[0].reshape(-1)
     positions, normals = rows_of(transfer.positions[order], transfer.normals[order])
-    return rows, directions, basis, positions, normals
+    return rows, lights, positions, normals
 
 
 def _sampled(coefficients, parts, rows, quantized):
@@ -111,7 +109,7 @@ def joined(slices, starts, shared):
     return on_rows(join, shared, (0,), 0, slices)
 
 
-def _turns(axes: Float[Array, "tiles 3"]) -> Float[Array, "tiles 3 3"]:
+def turns(axes: Float[Array, "tiles 3"]) -> Float[Array, "tiles 3 3"]:
     """Builds rotations that take +z to each axis.
 
     Duff et al. 2017, "Building an orthonormal basis, revisited".

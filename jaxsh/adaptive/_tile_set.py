@@ -8,20 +8,22 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float, Int, Int8
 
 from .._core.checks import check_flag
-from .._core.linalg import matmul
+from .._core.linalg import matmul, tensordot
 from .._core.xla import materialize
 from ..harmonics import degree_of, phong
 from ..transfer import AbstractTransfer, Material, shade_diffuse
 from ..transfer._glossy_kernels import (
-    block_sums,
     checked_eye,
     checked_material,
     checked_one_light,
     mirrored,
 )
 from ._method import check_whole_degree, one_exponent
-from ._result import AdaptiveResult, full_cost, product_cost, sum_cost
+from ._result import AdaptiveResult, full_cost, product_cost
 from ._sharing import on_rows, own, sharing_of_groups
+from ._tile_samples import turns
+from ._tile_sums import ORDERS, lobe_sums
+from ._tile_weights import placed, tile_weights
 from ._tiling import Tiling
 
 
@@ -47,11 +49,10 @@ class TileSet(eqx.Module):
     tiling: Tiling
     place: Int[Array, " v"]  # where in the permutation each vertex is
     samples: Int8[Array, "blocks n b"] | Float[Array, "blocks n b"]
-    scales: Float[Array, "blocks n"]  # a value, in a tile's directions, is sample times scale
-    directions: Float[Array, "tiles n 3"]
-    basis: Float[Array, "k tiles n"]  # there
-    powers: Float[Array, "terms bands"]  # of the lobe around them, as `LocalRule` has it
-    lowest: Float[Array, ""]
+    scales: Float[Array, "blocks n"]  # a number of a vertex is sample times scale
+    lights: Float[Array, "k tiles m"]  # the rule's, around each tile's axis
+    core: Float[Array, "bands m g n"]  # of the rule
+    reach: Float[Array, ""]
     positions: Float[Array, "3 places"]
     normals: Float[Array, "3 places"]  # at unit length
     diffuse: AbstractTransfer
@@ -64,7 +65,7 @@ class TileSet(eqx.Module):
 
     @property
     def degree(self) -> int:
-        return degree_of(len(self.basis))
+        return degree_of(len(self.lights))
 
     def __call__(
         self,
@@ -75,24 +76,27 @@ class TileSet(eqx.Module):
         distant: bool = False,
         normalized: bool = True,
     ) -> AdaptiveResult:
-        """Shade a frame, with each tile's lobes summed in a few directions where they look.
+        """Shade a frame, with weights that change smoothly across each tile.
 
-        `transfer.shade_glossy` sums light times transfer times lobe over directions all around, as
-        many as are exact: 350 at degree 10. The vertices of a tile mirror the eye to nearly the
-        same direction B, and a lobe is small away from it. So a tile has a few directions of its
-        own,
+        The vertices of a tile mirror the eye to nearly the same direction B. Around it glossy light
 
-            S = ρ_s Σ_n L(ω_n) lobe(B·ω_n) (A O)_n,
+            S = ρ_s ∫ L(ω) O(ω) lobe(B·ω) dω
 
-        with weights A that make the most of them (`docs/adaptive_tiles.md`). No band of light,
-        transfer or lobe is dropped, and each vertex has its own B. There is no threshold; the
-        error changes at once only where another tile set takes over. The diffuse part is computed
-        in full. Not in Lee & Kim 2014. Experiment `leekim2014.table1` prints what it gains.
+        is made of a few numbers of the light, M L, and of the transfer, A O, and smooth in B:
+
+            S ≈ ρ_s Σ_n w_n(B) (A O)_n,    w_n(B) = Σ_m (M L)_m c_mn(B),
+
+        with M, A and c the best for lights and transfers to come (`docs/adaptive_tiles.md`). In
+        each frame w is computed for each tile, with first and second derivatives in B, where its
+        vertices mirror this eye on average; each vertex has the sum for its own B. There is no
+        threshold; the error changes at once only where another tile set takes over. The diffuse
+        part is computed in full. Not in Lee & Kim 2014. Experiment `leekim2014.table1` prints what
+        it gains.
 
         **Arguments**
 
         - `light`, `eye`, `material`, `distant`, `normalized`: as for `transfer.shade_glossy`; one
-          light (3, K) of the transfer's degree, and one exponent. An eye or an exponent other than
+          light (3, K) of the transfer's degree, and one exponent. An eye or an exponent far from
           those that the set was made for costs accuracy and no more.
 
         **Returns** an `AdaptiveResult`; `active_fraction` is empty. Linear in light and albedos,
@@ -103,7 +107,7 @@ class TileSet(eqx.Module):
         whose lobe changes with the angle of view, and for a set that is shared out over devices
         otherwise than the transfer was that it was made of.
         """
-        count, dtype = self.num_points, self.basis.dtype
+        count, dtype = self.num_points, self.lights.dtype
         light = checked_one_light(light, count, self.degree, dtype)
         check_whole_degree("tiles", light, self.degree)
         eye, material = checked_eye(eye, dtype), checked_material(material, count, dtype)
@@ -115,46 +119,45 @@ class TileSet(eqx.Module):
 
 @functools.partial(jax.jit, static_argnames=("distant", "normalized", "shared"))
 def _shade_tiles(light, eye, material, tiles, distant, normalized, shared):
-    width, count, directions = tiles.basis.shape
-    zonal = phong(one_exponent(material, count), tiles.degree, normalized=normalized)
-    lobe = matmul(tiles.powers, zonal)
-    rows = tiles.tiling.tile, tiles.place, tiles.samples, tiles.scales, tiles.directions
-    points = tiles.basis, tiles.positions, tiles.normals
+    zonal = phong(one_exponent(material, tiles.num_points), tiles.degree, normalized=normalized)
+    core = tensordot(zonal, tiles.core)
+    rows = tiles.tiling.tile, tiles.tiling.axes, tiles.place, tiles.samples, tiles.scales
+    points = tiles.lights, tiles.positions, tiles.normals
     glossy = on_rows(
         functools.partial(_glossy, distant),
         shared,
         (None, None, None, None, 0, 1),
         0,
-        *(light, eye, lobe, tiles.lowest, rows, points),
+        *(light, eye, core, tiles.reach, rows, points),
     )
     albedo = material.specular
     albedo = albedo if albedo.ndim == 2 else albedo.reshape(1, -1)
     color = glossy * albedo + shade_diffuse(light, tiles.diffuse, material.diffuse)
-    degree, terms = tiles.degree, len(tiles.powers)
+    degree, (numbers, powers, components) = tiles.degree, core.shape
     cost = product_cost("diffuse", 0, degree, degree)
-    cost += sum_cost(degree, degree, directions, terms)
-    cost += count * directions * 3 * width / len(tiles.place) / full_cost(degree)  # of the light
+    cost += 3 * len(ORDERS) * components / full_cost(degree)
+    of_tile = 3 * numbers * len(tiles.lights) + 3 * components * powers * (numbers + len(ORDERS))
+    cost += len(tiles.tiling.axes) * of_tile / len(tiles.place) / full_cost(degree)
     return AdaptiveResult(color, {}, jnp.asarray(cost, color.dtype))
 
 
-def _glossy(distant, light, eye, lobe, lowest, rows, points):
+def _glossy(distant, light, eye, core, reach, rows, points):
     """Computes the glossy part of the rows at hand."""
-    tile, place, samples, scales, at = rows
-    basis, positions, normals = points
-    (width, count, directions), (blocks, _, size) = basis.shape, samples.shape
+    tile, axes, place, samples, scales = rows
+    of_tiles, positions, normals = points
+    (width, count, numbers), (blocks, _, size) = of_tiles.shape, samples.shape
     tile, place = own(tile, count), own(place, blocks * size)
-    lights = matmul(light, basis.reshape(width, -1)).reshape(3, count, directions)
-    weights = jnp.swapaxes(lights, 0, 1)[tile] * scales[:, None]
 
-    axis = mirrored(eye, positions, normals, distant).reshape(3, blocks, 1, size)
-    values = materialize(_lobed, axis, at[tile], lobe, lowest, samples)
-    glossy = materialize(block_sums, weights, values)
+    def seen(eye, positions, normals):
+        axis = mirrored(eye, positions, normals, distant)
+        return tuple(part.reshape(3, blocks, size) for part in (axis, normals))
+
+    axis, normals = materialize(seen, eye, positions, normals)
+    middle, wide, changes = placed(axis, normals, tile, turns(axes))
+    lights = matmul(light, of_tiles.reshape(width, -1)).reshape(3, count, numbers)
+    weights = tile_weights(jnp.swapaxes(lights, 0, 1), core, middle, wide, reach)
+    weights = weights[tile] * jnp.tile(scales, (1, len(ORDERS)))[:, None]
+    glossy = materialize(lobe_sums, weights, samples, changes)
     # Rows of four, since a gather of three takes one number at a time.
     glossy = jnp.pad(jnp.swapaxes(glossy, 1, 2), ((0, 0), (0, 0), (0, 1))).reshape(-1, 4)
     return glossy.at[place].get(mode="promise_in_bounds")[:, :3]
-
-
-def _lobed(axis, directions, lobe, lowest, samples):
-    x, y, z = (directions[..., i, None] for i in range(3))
-    t = jnp.maximum(x * axis[0] + y * axis[1] + z * axis[2], lowest) - (1 + lowest) / 2
-    return samples.astype(t.dtype) * functools.reduce(lambda value, c: value * t + c, lobe[::-1])

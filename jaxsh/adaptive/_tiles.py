@@ -1,4 +1,4 @@
-"""Glossy shading with a few quadrature directions around each tile's mirrored direction."""
+"""Glossy shading with a few numbers a vertex, whose weights change smoothly across each tile."""
 
 import math
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from ._tile_samples import arrange_all, joined, outlined, places, slice_of
 from ._tile_set import TileSet
 from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling
 
-DIRECTIONS = 40
+COMPONENTS = 24
 EXPONENT = 32.0
 
 
@@ -30,7 +30,7 @@ def make_tiles(
     distant: bool = False,
     num_tiles: int = NUM_TILES,
     block: int = BLOCK,
-    directions: int = DIRECTIONS,
+    components: int = COMPONENTS,
     exponent: float = EXPONENT,
     quantized: bool = True,
     diffuse: AbstractTransfer | None = None,
@@ -45,14 +45,13 @@ def make_tiles(
     - `num_tiles`: more are more exact.
     - `block`: the number of vertices that a tile's size is a multiple of. Devices that share the
       vertices share it too, down to 16, so that their tiles are as narrow as one device's.
-    - `directions`: of each tile. More are more exact, and cost more per frame; as many as
-      `transfer.sample` takes leave no error.
+    - `components`: numbers of a vertex that its glossy part is made of. More are more exact, and
+      cost more per frame.
     - `exponent`: of the lobes to come. Others are less exact.
-    - `quantized`: whether samples and the diffuse part are rounded to eight bits; the error of the
-      samples' rounding does not show beside that of the directions.
+    - `quantized`: whether these numbers and the diffuse part are rounded to eight bits.
     - `diffuse`: the diffuse part, where it is there already, in any form.
 
-    **Returns** a `TileSet`, to be called with light, eye and material. It takes `directions`
+    **Returns** a `TileSet`, to be called with light, eye and material. It takes `components`
     numbers a vertex, and the diffuse part. Neither traceable nor differentiable; raises
     `ValueError` for an eye that is no vector, for numbers below 1, and for an exponent that is not
     above -1.
@@ -67,12 +66,12 @@ def make_tiles(
     >>> tiles(jnp.ones((3, 9)), eye, transfer.Material(0.5, 0.5, 32.0)).color.shape
     (50, 3)
     """
-    check_rule(directions, exponent)
+    check_rule(components, exponent)
     tiling = make_tiling(transfer, eye, distant=distant, num_tiles=num_tiles, block=block)
     return arrange(
         transfer,
         tiling,
-        directions=directions,
+        components=components,
         exponent=exponent,
         quantized=quantized,
         diffuse=diffuse,
@@ -83,12 +82,12 @@ def arrange(
     transfer: Transfer,
     tiling: Tiling,
     *,
-    directions: int = DIRECTIONS,
+    components: int = COMPONENTS,
     exponent: float = EXPONENT,
     quantized: bool = True,
     diffuse: AbstractTransfer | None = None,
 ) -> TileSet:
-    """Sample the transfer in the order of a tiling, in directions about each tile's own.
+    """Put the transfer in the order of a tiling, in few numbers a vertex.
 
     Other arguments and errors as for `make_tiles`; raises `ValueError` for a tiling of another
     mesh, or of one that is shared out otherwise, too.
@@ -99,10 +98,10 @@ def arrange(
     >>> points = sphere.fibonacci(50).directions
     >>> made = transfer.unshadowed(points, points, degree=2)
     >>> tiling = adaptive.make_tiling(made, points[0], num_tiles=3, block=8)
-    >>> adaptive.arrange(made, tiling, directions=9).samples.shape
-    (7, 9, 8)
+    >>> adaptive.arrange(made, tiling, components=5).samples.shape
+    (7, 5, 8)
     """
-    check_rule(directions, exponent)
+    check_rule(components, exponent)
     check_type("transfer", transfer, Transfer)
     check_cosine(transfer)
     check_type("tiling", tiling, Tiling)
@@ -110,9 +109,9 @@ def arrange(
     check_known("arrange", transfer, tiling)
     shared = sharing(transfer.coefficients)
     place = places(tiling.permutation, transfer.num_points, shared)
-    rule = _placed(local_rule(transfer.degree, directions, float(exponent)), transfer, shared)
+    rule = _placed(local_rule(transfer.degree, components, float(exponent)), transfer, shared)
     diffuse = diffuse_part(transfer, diffuse, quantized)
-    arranged = arrange_all(transfer, tiling, rule[0], rule[1], quantized, shared)
+    arranged = arrange_all(transfer, tiling, rule[1], rule[0], quantized, shared)
     return _tile_set(tiling, place, rule, diffuse, arranged, shared)
 
 
@@ -130,7 +129,7 @@ def arranged_in_slices(
     """
     shared = sharing(transfer.coefficients)
     parts = _placed(rule, transfer, shared)
-    rows, *outline = outlined(transfer, tiling, parts[0], parts[1], shared)
+    rows, *outline = outlined(transfer, tiling, parts[1], parts[0], shared)
     blocks = len(tiling.tile) // (shared.parts if shared else 1)
     size = equal_blocks(blocks, math.ceil(blocks / slices))
     done, starts = [], []
@@ -152,16 +151,15 @@ def _placed(rule: LocalRule, transfer: Transfer, shared: Shared | None) -> tuple
 
 
 def _tile_set(tiling, place, rule, diffuse, arranged, shared) -> TileSet:
-    samples, scales, at, basis, positions, normals = arranged
+    samples, scales, lights, positions, normals = arranged
     return TileSet(
         tiling,
         place=place,
         samples=samples,
         scales=scales,
-        directions=at,
-        basis=basis,
-        powers=rule[2],
-        lowest=rule[3],
+        lights=lights,
+        core=rule[2],
+        reach=rule[3],
         positions=positions,
         normals=normals,
         diffuse=diffuse,
@@ -170,7 +168,7 @@ def _tile_set(tiling, place, rule, diffuse, arranged, shared) -> TileSet:
 
 
 class Tiles(AbstractMethod):
-    """Shades glossily in a few directions around each tile's mirrored direction: see `TileSet`.
+    """Shades glossily with weights that change smoothly across each tile: see `TileSet`.
 
     **Options**
 
@@ -182,14 +180,14 @@ class Tiles(AbstractMethod):
     **Example**
 
     >>> from jaxsh import adaptive
-    >>> adaptive.Tiles(directions=60).num_tiles
-    128
+    >>> adaptive.Tiles(components=40).num_tiles
+    320
     """
 
     tiles: TileSet | None = None
     num_tiles: int = eqx.field(static=True, default=NUM_TILES)
     block: int = eqx.field(static=True, default=BLOCK)
-    directions: int = eqx.field(static=True, default=DIRECTIONS)
+    components: int = eqx.field(static=True, default=COMPONENTS)
     exponent: float | None = eqx.field(static=True, default=None)
     quantized: bool = eqx.field(static=True, default=True)
     distant: bool = eqx.field(static=True, default=False)
@@ -200,7 +198,7 @@ class Tiles(AbstractMethod):
             check_type("tiles", self.tiles, TileSet)
         check_size("num_tiles", self.num_tiles)
         check_size("block", self.block)
-        check_rule(self.directions, 1.0 if self.exponent is None else self.exponent)
+        check_rule(self.components, 1.0 if self.exponent is None else self.exponent)
         for name in ("quantized", "distant", "normalized"):
             check_flag(name, getattr(self, name))
 
@@ -224,7 +222,7 @@ class Tiles(AbstractMethod):
                 distant=self.distant,
                 num_tiles=self.num_tiles,
                 block=self.block,
-                directions=self.directions,
+                components=self.components,
                 exponent=exponent,
                 quantized=self.quantized,
             )

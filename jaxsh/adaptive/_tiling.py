@@ -17,8 +17,8 @@ from ._sharing import made_of_rows, on_rows, sharing
 from ._splits import split as tiles_of
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
-BLOCK = 128
-NUM_TILES = 128
+BLOCK = 64
+NUM_TILES = 320
 # Vertices of a block at least, where devices share out the vertices and those of their blocks.
 _LEAST = 16
 

@@ -16,14 +16,14 @@ def ball(rng) -> transfer.Transfer:
 
 def test_atlas_takes_the_nearest_view(ball):
     atlas = make_tile_atlas(
-        ball, distance=3.0, views=5, num_tiles=4, block=32, directions=7, exponent=9.0
+        ball, distance=3.0, views=5, num_tiles=4, block=32, components=7, exponent=9.0
     )
     for view in (0, 3):
         eye = atlas.center + 2.5 * atlas.eyes[view]
         assert atlas.view(eye) == view
     eye = atlas.center + 3.0 * atlas.eyes[3]
     expected = make_tiling(ball, eye, num_tiles=4, block=32)
-    expected = arrange(ball, expected, directions=7, exponent=9.0)
+    expected = arrange(ball, expected, components=7, exponent=9.0)
     jax.tree.map(np.testing.assert_array_equal, atlas.nearest(ball, eye), expected)
 
 

@@ -11,6 +11,7 @@ from jaxsh.adaptive import (
     Tiles,
     Tiling,
     _local_rule,
+    _tile_samples,
     _tile_set,
     arrange,
     make_tile_atlas,
@@ -41,96 +42,101 @@ MATERIAL = transfer.Material(jnp.asarray(0.5), jnp.asarray([0.5, 0.3, 0.1]), jnp
 
 @pytest.mark.parametrize(
     ("dtype", "tolerance"),
-    [pytest.param(jnp.float32, 2e-6, marks=pytest.mark.slow), (jnp.float64, 1e-14)],
+    [pytest.param(jnp.float32, 3e-4, marks=pytest.mark.slow), (jnp.float64, 3e-4)],
     ids=["float32", "float64"],
 )
-def test_tiles_are_exact_in_exact_directions(ball, light, dtype, tolerance):
-    """At degree 3 there are 38, fewer than are taken."""
+def test_tiles_of_one_vertex_with_all_numbers_are_nearly_exact(ball, light, dtype, tolerance):
+    """What is left is the rule's polynomials of where the lobe points."""
     ball, light, material = cast((ball, light, MATERIAL), dtype)
     eye = jnp.asarray(EYE, dtype)
-    tiles = make_tiles(ball, eye, num_tiles=5, block=16, quantized=False)
-    assert tiles.samples.shape[1] == 38
+    tiles = make_tiles(
+        ball, eye, num_tiles=COUNT, block=1, components=16, exponent=8.0, quantized=False
+    )
+    assert tiles.samples.shape == (COUNT, 16, 1)
     result = tiles(light, eye, material)
     assert result.color.dtype == dtype
     full = transfer.shade_glossy(light, ball, eye, material)
     np.testing.assert_allclose(result.color, full, rtol=0, atol=tolerance)
 
 
-@pytest.mark.parametrize(
-    ("dtype", "tolerance"),
-    [pytest.param(jnp.float32, 2e-6, marks=pytest.mark.slow), (jnp.float64, 4e-14)],
-    ids=["float32", "float64"],
-)
-def test_a_rule_of_few_directions_is_applied_as_it_is_written(rng, dtype, tolerance):
-    """Degree 4, 40 of its 74 directions; tile by tile by hand, for two eyes."""
+def test_a_frame_is_the_rule_as_it_is_written(rng):
+    """Tile by tile by hand, for two eyes: polynomials about the middle by least squares."""
     degree, exponent, count = 4, 16.0, 70
     normals = sphere.fibonacci(count).directions.at[3].set(jnp.nan)
-    rows = rng.normal(size=(2, count, 25))
-    made = transfer.Transfer(
-        jnp.asarray(rows[0]), normals, normals, jnp.zeros((count, 1), jnp.int32)
-    )
-    made = eqx.tree_at(lambda t: t.positions, made, jnp.nan_to_num(normals))
+    rows = jnp.asarray(rng.normal(size=(count, 25)))
+    made = transfer.Transfer(rows, jnp.nan_to_num(normals), normals, jnp.zeros((count, 1), int))
+    made = eqx.tree_at(lambda t: t.neighbors, made, made.neighbors.astype(jnp.int32))
     light, material = jnp.asarray(rng.normal(size=(3, 25))), transfer.Material(0.0, 1.0, exponent)
-    tiles = make_tiles(made, EYE, num_tiles=3, block=16, exponent=exponent, quantized=False)
+    tiles = make_tiles(
+        made, EYE, num_tiles=3, block=16, components=12, exponent=exponent, quantized=False
+    )
     eyes = jnp.asarray([EYE, EYE + 0.2])
-    cast_ = [cast(x, dtype) for x in (light, made, eyes, material, tiles)]
-
-    def color(eye):
-        return cast_[4](cast_[0], eye, cast_[3]).color
-
-    ours = jax.vmap(color)(cast_[2])
-    rule = _local_rule.local_rule(degree, 40, exponent)
-    lobe = rule.powers @ np.asarray(harmonics.phong(exponent, degree, normalized=True))
-    samples = np.asarray(tiles.samples)
-    for eye, got in zip(eyes, np.asarray(ours), strict=True):
+    ours = np.asarray(jax.vmap(lambda eye: tiles(light, eye, material).color)(eyes))
+    core = np.tensordot(harmonics.phong(exponent, degree, normalized=True), tiles.core, 1)
+    order = np.asarray(tiles.tiling.permutation)
+    for eye, got in zip(eyes, ours, strict=True):
         axis = np.asarray(transfer.reflected_direction(eye, made.positions, made.normals))
-        for tile, pole in enumerate(tiles.tiling.axes):
-            at = np.asarray(tiles.directions[tile])
-            np.testing.assert_allclose(at @ pole, rule.directions[:, 2], rtol=0, atol=1e-12)
-            lights = np.asarray(harmonics.evaluate(at, degree) @ light.T)
-            for block in np.flatnonzero(np.asarray(tiles.tiling.tile) == tile):
-                members = np.asarray(tiles.tiling.permutation)[block]
-                cosines = np.maximum(axis[members] @ at.T, rule.lowest)
-                lobes = np.polynomial.polynomial.polyval(cosines - rule.middle, lobe)
-                expected = (lobes * samples[block].T) @ lights
-                np.testing.assert_allclose(
-                    got[members], expected, rtol=0, atol=tolerance * np.abs(ours).max()
-                )
+        facing = np.sum(np.nan_to_num(normals) * axis, axis=1)
+        for tile, turn in enumerate(np.asarray(_tile_samples.turns(tiles.tiling.axes))):
+            blocks = np.flatnonzero(np.asarray(tiles.tiling.tile) == tile)
+            members = order[blocks].ravel()
+            at = (axis[members] @ turn)[:, :2]
+            share = np.maximum(facing[members], 0) + 0.05
+            middle = share @ at / share.sum()
+            width = np.sqrt(2 * share @ np.sum((at - middle) ** 2, axis=1) / share.sum())
+            points = _local_rule.disc(16)
+            there = middle + width * points
+            there /= np.maximum(np.linalg.norm(there, axis=1) / 0.25, 1)[:, None]
+            powers = np.stack(_local_rule.monomials(*there.T / 0.25), axis=-1)
+            weights = np.einsum("pg,mgn->pmn", powers, core)
+            fit = np.linalg.lstsq(quadratic(points), weights.reshape(16, -1), rcond=None)[0]
+            there = (quadratic((at - middle) / width) @ fit).reshape(len(at), *weights.shape[1:])
+            lights = np.asarray(light) @ np.asarray(tiles.lights)[:, tile]
+            samples = np.moveaxis(np.asarray(tiles.samples)[blocks], 1, 2).reshape(len(at), -1)
+            expected = np.einsum("cm,vmn,vn->vc", lights, there, samples)
+            np.testing.assert_allclose(got[members], expected, rtol=0, atol=1e-11 * abs(ours).max())
+
+
+def quadratic(points):
+    x, y = points.T
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
 
 
 def test_tiles_with_albedos_per_vertex(ball, light, rng):
     albedos = [jnp.asarray(rng.uniform(size=(COUNT, channels))) for channels in (3, 1)]
-    material = transfer.Material(*albedos, jnp.asarray(8.0))
     tiles = make_tiles(ball, EYE, distant=True, num_tiles=5, block=16, quantized=False)
-    result = tiles(light, EYE, material, distant=True, normalized=False)
-    full = transfer.shade_glossy(light, ball, EYE, material, distant=True, normalized=False)
-    np.testing.assert_allclose(result.color, full, rtol=0, atol=1e-14)
+
+    def color(diffuse, specular):
+        material = transfer.Material(diffuse, specular, jnp.asarray(8.0))
+        return tiles(light, EYE, material, distant=True, normalized=False).color
+
+    one, none = jnp.ones(()), jnp.zeros(())
+    expected = albedos[0] * color(one, none) + albedos[1] * color(none, one)
+    np.testing.assert_allclose(color(*albedos), expected, rtol=0, atol=1e-14)
 
 
 @pytest.mark.slow
-def test_error_falls_with_the_directions(ball, light):
+def test_error_falls_with_the_numbers_and_with_the_tiles(ball, light):
     material = transfer.Material(jnp.asarray(0.0), jnp.asarray(1.0), jnp.asarray(8.0))
     full = transfer.shade_glossy(light, ball, EYE, material)
     errors = []
-    for directions in (8, 16, 32):
-        tiles = make_tiles(ball, EYE, num_tiles=24, block=1, directions=directions, exponent=8.0)
-        color = tiles(light, EYE, material).color
+    for components, tiles in ((4, 300), (8, 300), (16, 300), (16, 75)):
+        made = make_tiles(ball, EYE, num_tiles=tiles, block=1, components=components, exponent=8.0)
+        color = made(light, EYE, material).color
         errors.append(np.sqrt(np.mean((color - full) ** 2)) / np.std(full))
-    assert errors[0] < 0.12
-    assert errors[1] < 0.1
-    assert errors[2] < 0.03
+    assert errors[0] > 2 * errors[1] > 4 * errors[2]
+    assert errors[2] < 0.01
+    assert errors[2] < errors[3] < 0.1
 
 
-@pytest.mark.slow
 def test_tiles_of_another_view_are_less_exact_and_no_more(ball, light):
-    """The lobe has few terms where its directions are, and must not run away elsewhere."""
+    """Beyond the rule's reach its polynomials must not run away."""
     material = transfer.Material(jnp.asarray(0.0), jnp.asarray(1.0), jnp.asarray(8.0))
-    tiles = make_tiles(ball, EYE, num_tiles=24, block=1, directions=32, exponent=8.0)
-    assert tiles.lowest > -1
+    tiles = make_tiles(ball, EYE, num_tiles=24, block=1, components=16, exponent=8.0)
     for eye in (-EYE, EYE[::-1]):
         full = transfer.shade_glossy(light, ball, eye, material)
         color = tiles(light, eye, material).color
-        assert np.sqrt(np.mean((color - full) ** 2)) < 0.5 * np.std(full)
+        assert np.sqrt(np.mean((color - full) ** 2)) < 1.5 * np.std(full)
 
 
 def test_quantized_samples_are_half_a_scale_off(ball, light):
@@ -142,7 +148,7 @@ def test_quantized_samples_are_half_a_scale_off(ball, light):
     difference = np.asarray(rounded.samples) * scales - np.asarray(plain.samples)
     assert np.all(np.abs(difference) <= 0.501 * scales)
     colors = [t(light, EYE, MATERIAL).color for t in (plain, rounded)]
-    np.testing.assert_allclose(*colors, rtol=0, atol=4e-3 * np.abs(colors[0]).max())
+    np.testing.assert_allclose(*colors, rtol=0, atol=6e-3 * np.abs(colors[0]).max())
 
 
 def test_frames_reuse_compiled_code(ball, light):
@@ -155,29 +161,27 @@ def test_frames_reuse_compiled_code(ball, light):
     assert _tile_set._shade_tiles._cache_size() == before
 
 
-def test_tiles_differentiate_as_the_full_computation(ball, light, rng):
+def test_tiles_differentiate_as_differences_say(ball, light, rng):
     tiles = make_tiles(ball, EYE, num_tiles=5, block=16, quantized=False)
     weights = jnp.asarray(rng.normal(size=(COUNT, 3)))
 
-    def loss(shade):
-        return lambda *frame: jnp.sum(weights * shade(*frame))
-
-    def by_tiles(light, material, eye):
-        return tiles(light, eye, material).color
-
-    def in_full(light, material, eye):
-        return transfer.shade_glossy(light, ball, eye, material)
+    @jax.jit
+    def loss(frame):
+        light, material, eye = frame
+        return jnp.sum(weights * tiles(light, eye, material).color)
 
     frame = light, MATERIAL, jnp.asarray(EYE)
-    ours, theirs = (
-        jax.grad(loss(shade), argnums=(0, 1, 2))(*frame) for shade in (by_tiles, in_full)
-    )
-    jax.tree.map(
-        lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-11, atol=1e-11), ours, theirs
-    )
     tangents = jax.tree.map(lambda x: jnp.asarray(rng.normal(size=x.shape)), frame)
-    _, forward = jax.jvp(loss(by_tiles), frame, tangents)
-    backward = jax.tree.reduce(jnp.add, jax.tree.map(lambda a, b: jnp.sum(a * b), ours, tangents))
+    step = 1e-5
+
+    def along(t):
+        return loss(jax.tree.map(lambda x, tangent: x + t * tangent, frame, tangents))
+
+    expected = (along(step) - along(-step)) / (2 * step)
+    _, forward = jax.jvp(loss, (frame,), (tangents,))
+    np.testing.assert_allclose(forward, expected, rtol=1e-8)
+    gradient = jax.grad(loss)(frame)
+    backward = sum(jax.tree.leaves(jax.tree.map(lambda a, b: jnp.sum(a * b), gradient, tangents)))
     np.testing.assert_allclose(forward, backward, rtol=1e-10)
 
 
@@ -228,13 +232,13 @@ def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
         arrange(ball, twice)
     with pytest.raises(ValueError, match="expected a tiling of 100 vertices, got one of 300"):
         arrange(jax.tree.map(lambda x: x[:100] % 100, ball), tiles.tiling)
-    for wrong in ({"directions": 0}, {"exponent": -1.0}, {"exponent": float("nan")}):
+    for wrong in ({"components": 0}, {"exponent": -1.0}, {"exponent": float("nan")}):
         with pytest.raises(
-            ValueError, match=r"directions must be an integer >= 1|exponent must be a number > -1"
+            ValueError, match=r"components must be an integer >= 1|exponent must be a number > -1"
         ):
             make_tiles(ball, EYE, **wrong)
         with pytest.raises(
-            ValueError, match=r"directions must be an integer >= 1|exponent must be a number > -1"
+            ValueError, match=r"components must be an integer >= 1|exponent must be a number > -1"
         ):
             make_tile_atlas(ball, **wrong)
     with pytest.raises(ValueError, match="a view from 0 to 1, got 2"):

@@ -7,8 +7,8 @@ from jaxsh.adaptive import _tile_samples
 
 from .shared import DEGREE, K, V, baked, floats, integers, made_by, material, of
 
-# Tiles as `make_tiling` makes them of V vertices: 128 of 391 blocks of 128.
-BLOCKS, BLOCK, TILES, DIRECTIONS = -(-V // 128), 128, 128, 40
+# Tiles as `make_tiling` makes them of V vertices: 320 of 782 blocks of 64.
+BLOCKS, BLOCK, TILES, COMPONENTS, LIGHTS = -(-V // 64), 64, 320, 24, 30
 
 WITHOUT = {
     "AnchorSet.__call__": "lowered as `shade`, Anchors",
@@ -40,21 +40,20 @@ def anchor_set(made):
     )
 
 
-def arranged(made, tiling, directions, rows):
-    return _tile_samples.arrange_all(made, tiling, directions, rows, True)
+def arranged(made, tiling, lights, rows):
+    return _tile_samples.arrange_all(made, tiling, lights, rows, True)
 
 
-def tile_set(made, tiling, directions, rows):
-    samples, scales, at, basis, positions, normals = arranged(made, tiling, directions, rows)
+def tile_set(made, tiling, lights, rows):
+    samples, scales, lights, positions, normals = arranged(made, tiling, lights, rows)
     return adaptive.TileSet(
         tiling,
         place=jnp.zeros(V, jnp.int32),
         samples=samples,
         scales=scales,
-        directions=at,
-        basis=basis,
-        powers=jnp.zeros((7, DEGREE + 1), jnp.float32),
-        lowest=jnp.zeros((), jnp.float32),
+        lights=lights,
+        core=jnp.zeros((DEGREE + 1, LIGHTS, 15, COMPONENTS), jnp.float32),
+        reach=jnp.ones((), jnp.float32),
         positions=positions,
         normals=normals,
         diffuse=adaptive._staged.diffuse_part(made, None, True),
@@ -65,7 +64,7 @@ def tile_set(made, tiling, directions, rows):
 def calls():
     made, light, eye = baked(), floats(3, K), floats(3)
     tiling = made_by(adaptive.Tiling, integers(BLOCKS, BLOCK), integers(BLOCKS), floats(TILES, 3))
-    rule = floats(DIRECTIONS, 3), floats(DIRECTIONS, K)
+    rule = floats(LIGHTS, K), floats(COMPONENTS, K)
     anchors, tiles = made_by(anchor_set, made), made_by(tile_set, made, tiling, *rule)
     staged = made_by(adaptive.stage, made)
     rings = "a search through the mesh, ring by ring, until nobody joins"
