@@ -15,11 +15,14 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from .._core.host import read_only_cache
-from .._core.linalg import einsum
+from .._core.linalg import einsum, matmul
 from .._core.xla import materialize
 from ._indexing import degree_of
 from ._polynomials import solid_rows
 from ._tables import azimuth_table, gradient_table, zenith_table
+
+# Longer sums of few functions are no longer vectorized on a CPU.
+_WRITTEN_OUT = 4
 
 
 @jax.custom_jvp
@@ -34,7 +37,10 @@ def per_point(
 @jax.custom_jvp
 def shared(coefficients: Float[Array, "c k"], unit: Float[Array, "3 n 1"]) -> Float[Array, "n c"]:
     """Σ_k c[:, k] y_k, the same functions at all unit vectors."""
-    rows = _rows(unit, degree_of(coefficients.shape[-1]))
+    degree = degree_of(coefficients.shape[-1])
+    if degree > _WRITTEN_OUT:
+        return matmul(_basis(_stored(unit), degree), coefficients.T)
+    rows = _rows(unit, degree)
     return _sum(coefficients[None, :, k] * row for k, row in enumerate(rows))
 
 
