@@ -68,7 +68,11 @@ def _change(subscripts: str, turned, primals, tangents) -> Float[Array, "n c"]:
     if degree and coefficients.size and not isinstance(turn, SymbolicZero):
         parts.append(_anew(turned)(turn, coefficients, unit))
     count = unit.shape[1], coefficients.shape[-2]
-    return _sum(parts) if parts else jnp.zeros(count, coefficients.dtype)
+    if not parts:
+        return jnp.zeros(count, coefficients.dtype)
+    # Transposed, this stores the cotangent, which is made of the values: fused, all of these would
+    # be made anew for each of the coefficients.
+    return materialize(lambda _, change: change, unit, _sum(parts))
 
 
 def _rows(unit, degree: int) -> list[Array]:

@@ -5,14 +5,12 @@ large as memory allows, mostly all at once.
 """
 
 import functools
-import math
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from .._core.checks import (
-    align,
     as_finite,
     as_float,
     check_coefficients,
@@ -21,9 +19,9 @@ from .._core.checks import (
     check_vectors,
     flatten_batch,
 )
-from .._core.linalg import einsum, matmul
-from .._core.xla import equal_blocks, in_blocks, keep_rows, on_mesh, rows_at_once
-from ..harmonics import clamped_cosine, convolve, degree_of, evaluate
+from .._core.linalg import matmul
+from .._core.xla import equal_blocks, keep_rows, on_mesh, rows_at_once
+from ..harmonics import clamped_cosine, convolve, degree_of, evaluate, synthesize
 from ._quadrature import Quadrature
 
 # Directions per block on a CPU: 1 MB of basis at degree 10 in float32.
@@ -184,38 +182,15 @@ def _project(values, quadrature, degree: int):
 
 @jax.jit
 def _reconstruct(coefficients, directions):
-    values = _values(flatten_batch(coefficients), directions)
+    rows = flatten_batch(coefficients)
+    values = synthesize(rows, directions.astype(rows.dtype)).T
     return values.reshape(*coefficients.shape[:-1], len(directions))
 
 
 @jax.jit
 def _irradiance(light, normals):
-    degree = degree_of(light.shape[-1])
-    lit = convolve(light, clamped_cosine(degree))
-    points, channels = normals.shape[:-1], light.shape[-2]
-    aligned = max(0, light.ndim - 2 - len(points))
-    if math.prod(light.shape[aligned:-2]) == 1:  # all normals share each light
-        lights = light.shape[:aligned]
-        rows = flatten_batch(lit)
-        if len(points) > 1 and on_mesh(normals):  # flat, normals would lose their sharding
-            basis = evaluate(normals.astype(light.dtype), degree, axis=0)
-            values = einsum("bk,k...->b...", rows, basis)
-        else:
-            values = _values(rows, normals.reshape(-1, 3))
-        values = values.reshape(*lights, channels, *points)
-        return jnp.moveaxis(values, len(lights), -1)
-    basis = evaluate(normals.astype(light.dtype), degree)
-    return jnp.sum(jnp.multiply(*align(lit, basis[..., None, :])), axis=-1)
-
-
-def _values(rows: Float[Array, "b k"], directions: Float[Array, "n 3"]) -> Float[Array, "b n"]:
-    degree = degree_of(rows.shape[-1])
-
-    def block(directions):
-        return matmul(rows, evaluate(directions, degree, axis=0))
-
-    most = _most(degree, rows.dtype)
-    return in_blocks(block, directions.astype(rows.dtype), size=_BLOCK, most=most, out=1)
+    cosine = clamped_cosine(degree_of(light.shape[-1]))
+    return synthesize(convolve(light, cosine), normals)
 
 
 def _most(degree: int, dtype) -> int:

@@ -28,7 +28,7 @@ def by_evaluate(coefficients, vectors):
 
 
 @pytest.mark.parametrize(
-    "degree", [3, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 4, 6))]
+    "degree", [3, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 4, 5, 7))]
 )
 def test_values_are_those_of_scipy_for_all_batches(degree, rng):
     """Float64 to 4e-15 (measured 2e-15), float32 to 4e-6 (measured 1.5e-6)."""
@@ -59,7 +59,7 @@ def derivatives(f, c, vectors, change, turn):
 
 
 @pytest.mark.parametrize("leading", [(6, 3), (3,)])
-@pytest.mark.parametrize("degree", [0, 2, 5])
+@pytest.mark.parametrize("degree", [0, 2])
 @pytest.mark.slow
 def test_derivatives_in_every_mode_and_order(degree, leading, rng):
     """Against the sum over `evaluate`, whose rules are another way; at a pole, too."""
