@@ -18,7 +18,7 @@ def streamed_diffuse(
     shade: Callable[..., Array],
     light: Float[Array, "..."],
     transfer: StoredTransfer,
-    albedo: Float[Array, "..."],
+    albedo: Float[Array | np.ndarray, "..."],
 ) -> Float[np.ndarray, "... v 3"]:
     """Shade each block by `shade(light, transfer, albedo)`; the arguments are checked."""
     lights, albedos = _on_host("light", light), _on_host("albedo", albedo)
