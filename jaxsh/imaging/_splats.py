@@ -61,8 +61,7 @@ class Splats(eqx.Module):
     >>> from jaxsh import harmonics, imaging
     >>> splats = imaging.Splats(jnp.zeros((5, 3)), jnp.zeros((5, 3, 16)))
     >>> toward = splats.positions - jnp.array([0.0, -4.0, 0.0])
-    >>> basis = harmonics.evaluate(toward, degree=3)  # (5, 16)
-    >>> jnp.maximum(0.5 + (splats.coefficients * basis[:, None]).sum(axis=-1), 0).shape
+    >>> jnp.maximum(0.5 + harmonics.synthesize(splats.coefficients, toward), 0).shape
     (5, 3)
     """
 
