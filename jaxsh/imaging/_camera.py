@@ -62,7 +62,7 @@ class Camera(eqx.Module):
         for name in ("position", "target", "up"):
             if getattr(self, name).shape != (3,):
                 raise ValueError(f"expected {name} (3,), got shape {getattr(self, name).shape}")
-        if as_float(self.fov_y, "fov_y").ndim:
+        if not isinstance(self.fov_y, float) and as_float(self.fov_y, "fov_y").ndim:
             raise ValueError(f"expected fov_y as a number, got {described(self.fov_y)}")
         if check_size("width", self.width, 0) < 1 or check_size("height", self.height, 0) < 1:
             raise ValueError(f"a picture needs pixels, got {self.width} × {self.height}")

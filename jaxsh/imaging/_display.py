@@ -95,7 +95,7 @@ def tone_map(
     """
     check_choice("curve", curve, ("clip", "reinhard"))
     for name, number in (("exposure", exposure), ("white", white)):
-        if as_float(number, name).ndim:
+        if not isinstance(number, float) and as_float(number, name).ndim:
             raise ValueError(f"expected {name} as a number, got {described(number)}")
     image = as_radiance("image", image)
     if curve == "reinhard" and image.shape[-1:] != (3,):

@@ -165,8 +165,9 @@ def lobe(t: Float[Array, "..."], polynomial: Float[Array, "bands ..."]) -> Float
 
 def unit(vectors: Float[Array, "3 v"]) -> Float[Array, "3 v"]:
     """Scales to unit length; zero where a vector is zero or not finite."""
-    (x, y, z), (a, b, c) = vectors != 0, jnp.isfinite(vectors)
-    defined = ((x | y | z) & a & b & c)[None]
+    x, y, z = jnp.abs(vectors)
+    largest = jnp.maximum(jnp.maximum(x, y), z)
+    defined = ((largest > 0) & jnp.isfinite(largest))[None]
     unit, _ = normalize(jnp.where(defined, vectors, 1.0)[:, None])
     return jnp.where(defined, unit[:, 0], 0.0)
 
