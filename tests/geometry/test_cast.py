@@ -69,6 +69,20 @@ def test_shadows_from_the_surface_are_those_of_embree(bodies, rng):
     assert 0.1 < ours.mean() < 0.9
 
 
+def test_rays_that_are_checked_already_get_the_same_answers(bodies, rng):
+    """In any stride, as the bake has them, which asks `occluded` where one starts too far away."""
+    scene = EmbreeRayScene(bodies["knot"])
+    rays = rng.normal(size=(2, 2000, 4)).astype(np.float32)
+    starts, towards = rays[0, :, :3], rays[1, :, :3]
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    expected = scene.occluded(starts.copy(), towards.copy())
+    np.testing.assert_array_equal(scene.stops(starts, towards), expected)
+    assert 0 < expected.sum() < len(expected)
+    far = np.concatenate([starts, [[1e9, 0, 0]]])
+    assert scene.frame.beyond(far)
+    assert not scene.frame.beyond(starts)
+
+
 def test_hits_equal_those_of_the_slow_twin(soup, rng):
     origins, directions = rng.normal(size=(2, 3000, 3)).astype(np.float32)
     scene = JaxRayScene(soup)

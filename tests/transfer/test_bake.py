@@ -12,6 +12,7 @@ from bodies import relative
 from jax.sharding import AxisType, NamedSharding, PartitionSpec
 
 from jaxsh.geometry import (
+    EmbreeRayScene,
     JaxRayScene,
     Mesh,
     _embree,
@@ -89,6 +90,18 @@ def test_equals_the_slow_twin(directions, tolerance):
     got = baked(mesh, 3, directions=directions, seed=5, ray_bias=1e-4)[vertices]
     assert relative(baked(mesh, 3, shadows=False)[vertices], twin) > 0.1
     assert relative(got, twin) < tolerance
+
+
+def test_a_scene_that_says_otherwise_is_asked():
+    """Of Embree's scene rays are cast without `occluded`, but not where that is another's."""
+
+    class Open(EmbreeRayScene):
+        def occluded(self, origins, directions, max_distance=np.inf):
+            return np.zeros(len(origins), bool)
+
+    mesh = knot(400)
+    lit = baked(mesh, 3, directions=64, scene=Open(mesh))
+    np.testing.assert_array_equal(lit, baked(mesh, 3, shadows=False))
 
 
 @pytest.mark.slow

@@ -163,7 +163,11 @@ def _blocked(
     """Find the blocked directions above the surface with as few rays as tell them."""
     (_, vectors), _, nearest, around = lights
     guides, stops = around.shape[1], scene.occluded
-    if isinstance(scene, EmbreeRayScene) and not scene.frame.beyond(origins):
+    if (
+        isinstance(scene, EmbreeRayScene)
+        and type(scene).occluded is EmbreeRayScene.occluded  # and not a user's own
+        and not scene.frame.beyond(origins)
+    ):
         origins, stops = scene.frame.into(origins), scene.stops
     starts = in_fours(origins)
 
