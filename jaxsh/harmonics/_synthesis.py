@@ -16,13 +16,16 @@ from jaxtyping import Array, Float
 
 from .._core.host import read_only_cache
 from .._core.linalg import einsum, matmul
-from .._core.xla import materialize
+from .._core.xla import in_blocks, materialize, rows_at_once
+from ._basis import evaluate
 from ._indexing import degree_of
 from ._polynomials import solid_rows
 from ._tables import azimuth_table, gradient_table, zenith_table
 
 # Longer sums of few functions are no longer vectorized on a CPU.
 _WRITTEN_OUT = 4
+# Directions per block on a CPU: 1 MB of basis at degree 10 in float32.
+_BLOCK = 2048
 
 
 @jax.custom_jvp
@@ -39,9 +42,22 @@ def shared(coefficients: Float[Array, "c k"], unit: Float[Array, "3 n 1"]) -> Fl
     """Σ_k c[:, k] y_k, the same functions at all unit vectors."""
     degree = degree_of(coefficients.shape[-1])
     if degree > _WRITTEN_OUT:
-        return matmul(_basis(_stored(unit), degree), coefficients.T)
+        return by_products(coefficients, unit[..., 0].T)
     rows = _rows(unit, degree)
     return _sum(coefficients[None, :, k] * row for k, row in enumerate(rows))
+
+
+def by_products(
+    coefficients: Float[Array, "c k"], vectors: Float[Array, "n 3"]
+) -> Float[Array, "n c"]:
+    """Σ_k c[:, k] y_k of any degree, for many functions: products, block by block on a CPU."""
+    degree = degree_of(coefficients.shape[-1])
+
+    def block(vectors):
+        return matmul(coefficients, evaluate(vectors, degree, axis=0))
+
+    most = rows_at_once(coefficients.shape[-1] * coefficients.dtype.itemsize)
+    return in_blocks(block, vectors, size=_BLOCK, most=most, out=1).T
 
 
 @functools.partial(per_point.defjvp, symbolic_zeros=True)

@@ -18,13 +18,12 @@ from .._core.vectors import normalize
 from .._core.xla import in_blocks, on_mesh, rows_at_once
 from ._basis import evaluate
 from ._indexing import degree_of
-from ._synthesis import per_point, shared
+from ._synthesis import by_products, per_point, shared
 
 # Up to here sums are written out.
 _LOW_DEGREE, _FEW_FUNCTIONS = 6, 4
-# Directions per block on a CPU: 1 MB of basis at degree 10 in float32. Blocks of coefficients are
-# copied, so that of those few are better: 64 MB of basis.
-_BLOCK, _LARGE_BLOCK = 2048, 2**17
+# Vectors per block on a CPU. Blocks of coefficients are copied, so that few are better.
+_BLOCK = 2**17
 
 
 def synthesize(
@@ -96,12 +95,7 @@ def _shared(rows: Float[Array, "b k"], vectors: Float[Array, "*points 3"]):
     vectors = vectors.reshape(-1, 3)
     if degree <= _LOW_DEGREE and len(rows) <= _FEW_FUNCTIONS:
         return shared(rows, _units(vectors))
-
-    def block(vectors):
-        return matmul(rows, evaluate(vectors, degree, axis=0))
-
-    most = rows_at_once(rows.shape[-1] * rows.dtype.itemsize)
-    return in_blocks(block, vectors, size=_BLOCK, most=most, out=1).T
+    return by_products(rows, vectors)
 
 
 def _per_point(coefficients, vectors):
@@ -121,7 +115,7 @@ def _per_point(coefficients, vectors):
             return einsum("nck,nk->nc", coefficients, evaluate(vectors, degree))
 
         most = rows_at_once(math.prod(flat.shape[1:]) * flat.dtype.itemsize)
-        values = in_blocks(block, flat, vectors, size=_LARGE_BLOCK, most=most)
+        values = in_blocks(block, flat, vectors, size=_BLOCK, most=most)
     return values.reshape(*batch, coefficients.shape[-2])
 
 
