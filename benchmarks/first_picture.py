@@ -102,7 +102,6 @@ SECTION = Section(
         Column("part", "part"),
         Column("cold_s", "cold, s", digits=2),
         Column("cached_s", "cached, s", digits=2),
-        Column("beside_s", "the other checkout, cold, s", digits=2),
         Column("cpu_s", "cold, CPU, s", digits=2),
         Column("programs", "programs"),
     ],
@@ -115,5 +114,7 @@ SECTION = Section(
 if __name__ == "__main__":
     other = Path(sys.argv[1]) if len(sys.argv) > 1 else None
     measured = list(timings("all", 3, "float32", other))
-    shown = [column for column in SECTION.columns if column.key in measured[0]]
+    shown = [*SECTION.columns]
+    if other:
+        shown.insert(1, Column("beside_s", f"{other.name}, cold, s", digits=2))
     print(to_markdown(Table(SECTION.title, shown), measured))
