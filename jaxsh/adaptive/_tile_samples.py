@@ -9,9 +9,9 @@ from jaxtyping import Array, Float, Int
 
 from .._core.linalg import matmul
 from .._core.xla import in_turn, rows_at_once
-from ..harmonics import rotate
 from ..transfer._glossy_kernels import in_steps, rows_of
 from ._sharing import Shared, made_of_rows, on_rows, own
+from ._turned import turned
 
 # Along which axis the rows of a device stand in a transfer, a tiling and a rule, and in what
 # `outlined` gives beside its weights.
@@ -68,7 +68,7 @@ def _own(transfer, tiling):
 
 
 def _outlined(transfer, tiling, lights, rows):
-    both = rotate(jnp.concatenate([rows, lights]), turns(tiling.axes)[:, None])
+    both = turned(jnp.concatenate([rows, lights]), tiling.axes)
     rows, lights = both[:, : len(rows)], jnp.moveaxis(both[:, len(rows) :], 2, 0)
     order = _own(transfer, tiling)[0].reshape(-1)
     positions, normals = rows_of(transfer.positions[order], transfer.normals[order])
@@ -110,13 +110,12 @@ def joined(slices, starts, shared):
 
 
 def turns(axes: Float[Array, "tiles 3"]) -> Float[Array, "tiles 3 3"]:
-    """Builds rotations that take +z to each axis.
-
-    Duff et al. 2017, "Building an orthonormal basis, revisited".
-    """
+    """Builds rotations that take +z to each axis: about y, then about z."""
     x, y, z = axes.T
-    sign = jnp.where(z < 0, -1.0, 1.0).astype(axes.dtype)
-    a = -1 / (sign + z)
-    b = x * y * a
-    first = jnp.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=-1)
-    return jnp.stack([first, jnp.stack([b, sign + y * y * a, -y], axis=-1), axes], axis=-1)
+    across = jnp.hypot(x, y)
+    pole = across == 0
+    scale = jnp.where(pole, 1, across)
+    cosine, sine = jnp.where(pole, 1, x) / scale, y / scale
+    first = jnp.stack([z * cosine, z * sine, -across], axis=-1)
+    second = jnp.stack([-sine, cosine, jnp.zeros_like(z)], axis=-1)
+    return jnp.stack([first, second, axes], axis=-1)
