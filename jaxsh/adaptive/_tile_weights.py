@@ -16,7 +16,7 @@ _AWAY = 0.05
 # The least squared width of a tile.
 _NARROW = 1e-6
 # Points of a tile at which its weights are fitted.
-_POINTS = 16
+_POINTS = 9
 
 
 def placed(
@@ -83,8 +83,13 @@ def tile_weights(
     whole = matmul(lights.reshape(tiles * channels, -1), core.reshape(len(core), -1))
 
     def combine(changes, whole):
-        whole = whole.reshape(tiles, channels, 1, *core.shape[1:])
-        terms = [changes[:, None, g, :, None] * whole[:, :, :, g] for g in range(core.shape[1])]
-        return functools.reduce(jnp.add, terms).reshape(tiles, channels, -1)
+        whole = whole.reshape(tiles, channels, *core.shape[1:])
+
+        def one(j):
+            terms = (changes[:, None, g, j, None] * whole[:, :, g] for g in range(core.shape[1]))
+            return functools.reduce(jnp.add, terms)
+
+        # Written out: XLA's CPU backend does so many small products of matrices one by one.
+        return jnp.concatenate([one(j) for j in range(changes.shape[-1])], axis=-1)
 
     return materialize(combine, changes, whole)

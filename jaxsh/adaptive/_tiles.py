@@ -181,7 +181,7 @@ class Tiles(AbstractMethod):
 
     >>> from jaxsh import adaptive
     >>> adaptive.Tiles(components=40).num_tiles
-    320
+    400
     """
 
     tiles: TileSet | None = None

@@ -18,7 +18,7 @@ from ._splits import split as tiles_of
 
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 64
-NUM_TILES = 320
+NUM_TILES = 400
 # Vertices of a block at least, where devices share out the vertices and those of their blocks.
 _LEAST = 16
 

@@ -84,12 +84,12 @@ def test_a_frame_is_the_rule_as_it_is_written(rng):
             share = np.maximum(facing[members], 0) + 0.05
             middle = share @ at / share.sum()
             width = np.sqrt(2 * share @ np.sum((at - middle) ** 2, axis=1) / share.sum())
-            points = _local_rule.disc(16)
+            points = _local_rule.disc(9)
             there = middle + width * points
             there /= np.maximum(np.linalg.norm(there, axis=1) / 0.25, 1)[:, None]
             powers = np.stack(_local_rule.monomials(*there.T / 0.25), axis=-1)
             weights = np.einsum("pg,mgn->pmn", powers, core)
-            fit = np.linalg.lstsq(quadratic(points), weights.reshape(16, -1), rcond=None)[0]
+            fit = np.linalg.lstsq(quadratic(points), weights.reshape(9, -1), rcond=None)[0]
             there = (quadratic((at - middle) / width) @ fit).reshape(len(at), *weights.shape[1:])
             lights = np.asarray(light) @ np.asarray(tiles.lights)[:, tile]
             samples = np.moveaxis(np.asarray(tiles.samples)[blocks], 1, 2).reshape(len(at), -1)

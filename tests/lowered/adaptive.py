@@ -7,8 +7,8 @@ from jaxsh.adaptive import _tile_samples
 
 from .shared import DEGREE, K, V, baked, floats, integers, made_by, material, of
 
-# Tiles as `make_tiling` makes them of V vertices: 320 of 782 blocks of 64.
-BLOCKS, BLOCK, TILES, COMPONENTS, LIGHTS = -(-V // 64), 64, 320, 24, 30
+# Tiles as `make_tiling` makes them of V vertices: 400 of 782 blocks of 64.
+BLOCKS, BLOCK, TILES, COMPONENTS, LIGHTS = -(-V // 64), 64, 400, 24, 30
 
 WITHOUT = {
     "AnchorSet.__call__": "lowered as `shade`, Anchors",
