@@ -1,7 +1,8 @@
 """Real spherical harmonics of vectors, and their gradient, in the layout that is fast.
 
 Two kernels: the 2(L+1) azimuth rows, then all K rows of the basis at once (see `_tables`). XLA
-would rather fuse the first into the second and compute each azimuth row K/(2L+2) times over.
+would rather fuse the first into the second and compute each azimuth row K/(2L+2) times over. Values
+of low degree alone are one pass over the vectors (see `_low_degree`).
 
 Derivatives never go through the products. A solid harmonic r^l y_lm has derivatives that are
 combinations of at most two solid harmonics of degree l-1, so one rule written in terms of the basis
@@ -19,7 +20,11 @@ from .._core.checks import as_float, check_degree, check_vectors, described
 from .._core.vectors import components_first, normalize
 from .._core.xla import materialize, on_mesh
 from ._indexing import degrees
+from ._low_degree import coefficients_first, points_first
 from ._tables import azimuth_table, gradient_table, zenith_table
+
+# Values up to here are computed in one pass over the vectors.
+_LOW_DEGREE = 6
 
 
 def evaluate(
@@ -93,9 +98,29 @@ def _evaluate(vectors, degree, axis):
     if vectors.ndim > 2 and on_mesh(vectors):
         # One batch axis at a time: two as one would lose the sharding of the second.
         return jax.vmap(lambda v: _evaluate(v, degree, axis), out_axes=1 + axis)(vectors)
+    flat, count = vectors.reshape(-1, 3), (degree + 1) ** 2
+    values = (
+        _values(flat, degree, axis) if 0 < degree <= _LOW_DEGREE else _by_rows(flat, degree, axis)
+    )
+    batch = vectors.shape[:-1]
+    return values.reshape((count, *batch) if axis == 0 else (*batch, count))
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(1, 2))
+def _values(vectors: Float[Array, "n 3"], degree: int, axis: int) -> Float[Array, "..."]:
+    """Values at low degree, in one pass; where they are differentiated, those of `_by_rows`."""
+    return (coefficients_first if axis == 0 else points_first)(vectors, degree)
+
+
+@_values.defjvp
+def _values_jvp(degree, axis, primals, tangents):
+    return jax.jvp(lambda vectors: _by_rows(vectors, degree, axis), primals, tangents)
+
+
+def _by_rows(vectors: Float[Array, "n 3"], degree: int, axis: int) -> Float[Array, "..."]:
     unit, _ = normalize(components_first(vectors))
-    basis = _solid(unit, degree).reshape((degree + 1) ** 2, *vectors.shape[:-1])
-    return basis if axis == 0 else jnp.moveaxis(basis, 0, -1)
+    basis = _solid(unit, degree)
+    return basis if axis == 0 else basis.T
 
 
 @functools.partial(jax.jit, static_argnums=(1, 2))
