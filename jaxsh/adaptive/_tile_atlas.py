@@ -18,7 +18,7 @@ from ._sharing import sharing
 from ._tile_samples import places
 from ._tile_set import TileSet
 from ._tiles import COMPONENTS, EXPONENT, arrange, arranged_in_slices
-from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling, vertex_areas
+from ._tiling import NUM_TILES, Tiling, make_tiling, vertex_areas
 
 # Slices of a set on an accelerator: at 50,000 vertices and degree 10 one is some 3,000 vertices.
 _SLICES = 16
@@ -91,7 +91,7 @@ def make_tile_atlas(
     distance: float | None = None,
     views: int = 128,
     num_tiles: int = NUM_TILES,
-    block: int = BLOCK,
+    block: int | None = None,
     components: int = COMPONENTS,
     exponent: float = EXPONENT,
 ) -> TileAtlas:

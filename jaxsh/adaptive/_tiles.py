@@ -17,7 +17,7 @@ from ._sharing import Shared, on_each_device, sharing
 from ._staged import diffuse_part
 from ._tile_samples import arrange_all, joined, outlined, places, slice_of
 from ._tile_set import TileSet
-from ._tiling import BLOCK, NUM_TILES, Tiling, make_tiling
+from ._tiling import NUM_TILES, Tiling, make_tiling
 
 COMPONENTS = 24
 EXPONENT = 32.0
@@ -29,7 +29,7 @@ def make_tiles(
     *,
     distant: bool = False,
     num_tiles: int = NUM_TILES,
-    block: int = BLOCK,
+    block: int | None = None,
     components: int = COMPONENTS,
     exponent: float = EXPONENT,
     quantized: bool = True,
@@ -43,7 +43,8 @@ def make_tiles(
       tiles of their own, `num_tiles` on each.
     - `eye`: a point, or with `distant` the direction to an eye far away.
     - `num_tiles`: more are more exact.
-    - `block`: the number of vertices that a tile's size is a multiple of. Devices that share the
+    - `block`: the number of vertices that a tile's size is a multiple of; by default 64, and a
+      smaller power of two for a small mesh. Devices that share the
       vertices share it too, down to 16, so that their tiles are as narrow as one device's.
     - `components`: numbers of a vertex that its glossy part is made of. More are more exact, and
       cost more per frame.
@@ -186,7 +187,7 @@ class Tiles(AbstractMethod):
 
     tiles: TileSet | None = None
     num_tiles: int = eqx.field(static=True, default=NUM_TILES)
-    block: int = eqx.field(static=True, default=BLOCK)
+    block: int | None = eqx.field(static=True, default=None)
     components: int = eqx.field(static=True, default=COMPONENTS)
     exponent: float | None = eqx.field(static=True, default=None)
     quantized: bool = eqx.field(static=True, default=True)
@@ -197,7 +198,8 @@ class Tiles(AbstractMethod):
         if self.tiles is not None:
             check_type("tiles", self.tiles, TileSet)
         check_size("num_tiles", self.num_tiles)
-        check_size("block", self.block)
+        if self.block is not None:
+            check_size("block", self.block)
         check_rule(self.components, 1.0 if self.exponent is None else self.exponent)
         for name in ("quantized", "distant", "normalized"):
             check_flag(name, getattr(self, name))

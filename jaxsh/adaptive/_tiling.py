@@ -1,6 +1,7 @@
 """Tilings: vertices that mirror the eye into nearly the same direction share a tile."""
 
 import functools
+import math
 
 import equinox as eqx
 import jax
@@ -19,6 +20,8 @@ from ._splits import split as tiles_of
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 64
 NUM_TILES = 400
+# Of a small mesh, blocks are smaller, down to this.
+_SMALLEST = 8
 # Vertices of a block at least, where devices share out the vertices and those of their blocks.
 _LEAST = 16
 
@@ -52,7 +55,7 @@ def make_tiling(
     *,
     distant: bool = False,
     num_tiles: int = NUM_TILES,
-    block: int = BLOCK,
+    block: int | None = None,
     areas: Float[ArrayLike, " v"] | None = None,
 ) -> Tiling:
     """Split all vertices again and again, the costliest tile first, into `num_tiles` tiles.
@@ -72,7 +75,8 @@ def make_tiling(
     """
     check_type("transfer", transfer, Transfer)
     distant = check_flag("distant", distant)
-    num_tiles, block = check_size("num_tiles", num_tiles), check_size("block", block)
+    num_tiles = check_size("num_tiles", num_tiles)
+    block = _usual(transfer, num_tiles) if block is None else check_size("block", block)
     check_known("make_tiling", transfer, eye)
     eye = checked_eye(eye, transfer.positions.dtype)
     if areas is None:
@@ -109,6 +113,12 @@ def _seen(eye, positions, normals, areas, distant) -> Float[Array, "v 4"]:
     axis = materialize(lambda *seen: mirrored(*seen, distant), eye, positions, normals)
     weights = areas * (jnp.maximum(jnp.sum(normals * axis, axis=0), 0) + 0.05)
     return jnp.concatenate([axis, weights[None].astype(axis.dtype)]).T
+
+
+def _usual(transfer: Transfer, num_tiles: int) -> int:
+    """Returns the largest block, a power of two, that leaves blocks enough to choose tiles from."""
+    each = max(transfer.num_points / (1.6 * num_tiles), _SMALLEST)
+    return min(BLOCK, 2 ** int(math.log2(each)))
 
 
 def _towards(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
