@@ -15,18 +15,8 @@ from jaxtyping import Array, Bool, Float
 from .._core.xla import materialize, on_mesh, rows_at_once, varying_as
 from ..harmonics import degrees
 from ..harmonics._tables import gradient_table
-from ._arc_nodes import (
-    Pair,
-    Rows,
-    Spans,
-    basis_at,
-    integrate_both,
-    integrate_even,
-    integrate_odd,
-    nodes_of,
-    sloped_nodes_of,
-    times,
-)
+from ._arc_integrals import arc_integrals, sloped_arc_integrals
+from ._arc_nodes import Pair, Rows, Spans, basis_at, integrate_odd, nodes_of, times
 from ._vectors import (
     close_cross,
     cross,
@@ -40,6 +30,8 @@ from ._vectors import (
 )
 
 _Y0 = float(np.sqrt(1 / (4 * np.pi)))
+# Arcs that the CPU takes at once: those of a quadrilateral.
+_GROUP = 4
 
 Vectors = Float[Array, "*_ 3 _"]  # of any shapes that broadcast
 
@@ -113,19 +105,19 @@ def coefficients(
     all that counts.
     """
 
-    def add_arc(total, arc):
+    def add_arcs(total, some):
         flux, angle = total
-        span, normal, triangle = arc
+        span, normal, triangle = some
         if degree:
-            nodes, weights = materialize(functools.partial(nodes_of, degree), span)
-            integral = materialize(integrate_even, basis_at(nodes, degree - 1), weights)
-            flux = flux + normal[:, None] * integral[None]
-        return flux, angle + _angle(triangle)
+            integral = materialize(functools.partial(arc_integrals, degree=degree - 1), span)
+            flux = flux + materialize(_outer_sum, normal, integral)
+        return flux, angle + _sum_rows(_angle(triangle))
 
     spans, triangles = materialize(_spans_and_triangles, arcs, apex)
     nothing = _nothing(arcs.start, 3, degree**2), _nothing(arcs.start)
-    flux, angle = _sum(add_arc, nothing, (spans, arcs.normal, triangles), active, degree)
-    return _from_flux(flux, angle, degree)
+    each = spans, arcs.normal, triangles
+    flux, angle = _sum(add_arcs, nothing, each, active, degree, _GROUP)
+    return materialize(functools.partial(_from_flux, degree=degree), flux, angle)
 
 
 @coefficients.defjvp
@@ -156,27 +148,46 @@ def _rate(arcs: Arcs, moves: Arcs, active: Array | None, degree: int):
 
 def coefficients_with_gradient(
     arcs: Arcs, apex: Float[Array, "3 n"], active: Bool[Array, " arcs"] | None, degree: int
-) -> tuple[Float[Array, "k n"], Float[Array, "3 k n"]]:
+) -> tuple[Float[Array, "k n"], Float[Array, "k 3 n"]]:
     """∫ y_k dω, and its gradient by the receiver's position, eq. (4), at the same nodes."""
-    lower = degree**2
-    sloped_nodes = functools.partial(sloped_nodes_of, degree + 2)
+
+    def outer(normal, change, *integrals):
+        return _pull(normal, change), *(_outer_sum(normal, row) for row in integrals)
 
     @jax.checkpoint
-    def add_arc(total, arc):
-        flux, pull, angle = total
-        span, normal, near, triangle = arc
-        nodes, weights, slopes = materialize(sloped_nodes, span, near)
-        change, *integrals = materialize(integrate_both, basis_at(nodes, degree), weights, slopes)
-        if degree:
-            flux = flux + normal[:, None] * integrals[0][None]
-        return flux, pull + normal[:, None] * change[None], angle + _angle(triangle)
+    def add_arcs(total, some):
+        pull, *flux, angle = total
+        span, normal, near, triangle = some
+        integrals = materialize(functools.partial(sloped_arc_integrals, degree=degree), span, near)
+        sums = materialize(outer, normal, *integrals)
+        added = (a + b for a, b in zip((pull, *flux), sums, strict=True))
+        return *added, angle + _sum_rows(_angle(triangle))
 
-    shapes = (3, lower), (3, (degree + 1) ** 2), ()
-    nothing = tuple(_nothing(arcs.start, *shape) for shape in shapes)
+    lower = [(3, degree**2)] if degree else []
+    nothing = tuple(
+        _nothing(arcs.start, *shape) for shape in (((degree + 1) ** 2, 3), *lower, ())
+    )
     spans, triangles = materialize(_spans_and_triangles, arcs, apex)
     each = spans, arcs.normal, arcs.near, triangles
-    flux, pull, angle = _sum(add_arc, nothing, each, active, degree)
-    return _from_flux(flux, angle, degree), -pull
+    pull, *flux, angle = _sum(add_arcs, nothing, each, active, degree, _GROUP)
+    light = materialize(functools.partial(_from_flux, degree=degree), *flux, angle)
+    return light, pull
+
+
+def _pull(normal: Rows, change: Float[Array, "k a n"]) -> Float[Array, "k 3 n"]:
+    """-Σ normal ∫ over the arcs, as a gradient is given: the axis last."""
+    terms = (-normal[a][None] * change[:, a, None] for a in range(len(normal)))
+    return functools.reduce(jnp.add, terms)
+
+
+def _outer_sum(normal: Rows, integrals: Float[Array, "k a n"]) -> Float[Array, "3 k n"]:
+    """Σ normal ∫ over the arcs."""
+    terms = (normal[a][:, None] * integrals[None, :, a] for a in range(len(normal)))
+    return functools.reduce(jnp.add, terms)
+
+
+def _sum_rows(rows: Float[Array, "a n"]) -> Float[Array, " n"]:
+    return functools.reduce(jnp.add, list(rows))
 
 
 def pair_bytes(degree: int, dtype) -> int:
@@ -184,29 +195,47 @@ def pair_bytes(degree: int, dtype) -> int:
     return (degree + 2) * (degree + 1) ** 2 * jnp.dtype(dtype).itemsize
 
 
-def _sum(add_arc, total, arcs, active: Bool[Array, " arcs"] | None, degree: int):
-    """Add up arcs: `add_arc(total, arc)` of zeros and one arc after the other.
+def group_bytes(degree: int, dtype) -> int:
+    """Bytes of the rows at the nodes of the arcs that the CPU takes at once, for one receiver."""
+    rows = 2 * degree + 1 + (degree + 1) ** 2  # azimuth rows, and zenith rows with two weights
+    return _GROUP * (degree + 1) * rows * jnp.dtype(dtype).itemsize
 
-    On the CPU those that no receiver has are left out. An accelerator takes as many at once as its
-    memory allows, and all that are given.
+
+def _sum(add, total, arcs, active: Bool[Array, " arcs"] | None, degree: int, group: int = 0):
+    """Add up arcs: `add(total, arc)` of zeros and one arc after the other.
+
+    With `group`, `add` takes several at once, that many of them on the CPU. There those that no
+    receiver has are left out. An accelerator takes as many at once as its memory allows, and all
+    that are given.
     """
-    once = jax.jit(add_arc)  # traced once for all ways
+    once = jax.jit(add)  # traced once for all ways
+    count = len(jax.tree.leaves(arcs)[0])
 
-    def one_by_one(total, arcs, active):
-        def add(total, arc):
-            arc, used = arc
+    def in_turn(total, arcs, active):
+        if group:
+            # Where arcs are left out, one by one.
+            groups = -(-count // group) if active is None else count
+            size = -(-count // groups)
+            arcs = jax.tree.map(lambda a: _fill(a, groups * size), arcs)
+            arcs = jax.tree.map(lambda a: a.reshape(groups, size, *a.shape[1:]), arcs)
+            if groups == 1:
+                return materialize(once, total, jax.tree.map(lambda a: a[0], arcs))
+
+        def add(total, some):
+            arcs, used = some
             if used is None:
-                return once(total, arc), None
-            return jax.lax.cond(used, once, lambda total, _: total, total, arc), None
+                return once(total, arcs), None
+            return jax.lax.cond(used, once, lambda total, _: total, total, arcs), None
 
         return jax.lax.scan(add, total, (arcs, active))[0]
 
     def together(total, arcs, _):
-        count = len(jax.tree.leaves(arcs)[0])
         like = jax.tree.leaves(total)[0]
         size = min(count, rows_at_once(pair_bytes(degree, like.dtype) * like.shape[-1]))
 
         def add(sums, some):
+            if group:
+                return once(sums, some), None
             parts = jax.vmap(functools.partial(once, total))(some)
             return jax.tree.map(lambda a, b: a + jnp.sum(b, axis=0), sums, parts), None
 
@@ -222,8 +251,13 @@ def _sum(add_arc, total, arcs, active: Bool[Array, " arcs"] | None, degree: int)
         return add(sums, rest)[0] if whole < count else sums
 
     if on_mesh(arcs):
-        return one_by_one(total, arcs, None)
-    return jax.lax.platform_dependent(total, arcs, active, cpu=one_by_one, default=together)
+        return in_turn(total, arcs, None)
+    return jax.lax.platform_dependent(total, arcs, active, cpu=in_turn, default=together)
+
+
+def _fill(rows: Float[Array, "count *any"], count: int) -> Array:
+    """Add arcs of zeros, which have no length."""
+    return jnp.pad(rows, [(0, count - len(rows))] + [(0, 0)] * (rows.ndim - 1))
 
 
 def _nothing(start: Rows, *shape: int) -> Array:
@@ -250,9 +284,7 @@ def _spans(arcs: Arcs) -> Spans:
     A middle is along a + b for arcs below π/2; above, b - a along the tangent has the digits.
     """
     start, end, normal = arcs.start, arcs.end, arcs.normal
-    inverse_start, inverse_end = inverse_length(start), inverse_length(end)
-    a, b = scale(inverse_start, start), scale(inverse_end, end)
-    both, chord = a + b, b - a
+    both, chord, inverse_start, inverse_end = materialize(_both_and_chord, start, end)
     closed, opened = dot(both, both), dot(chord, chord)  # 2 ± 2 cos θ
     wide = opened > closed
     inverse = inverse_length(select(wide, chord, both))
@@ -270,8 +302,16 @@ def _spans(arcs: Arcs) -> Spans:
     return Spans(middle, tangent, sine, cosine)
 
 
-def _from_flux(flux: Float[Array, "3 k n"], angle: Array, degree: int) -> Float[Array, "_ n"]:
+def _both_and_chord(start: Rows, end: Rows) -> tuple[Rows, Rows, Array, Array]:
+    """a + b and b - a of unit vectors, and what the lengths of both were."""
+    inverse_start, inverse_end = inverse_length(start), inverse_length(end)
+    a, b = scale(inverse_start, start), scale(inverse_end, end)
+    return a + b, b - a, inverse_start, inverse_end
+
+
+def _from_flux(*flux_and_angle: Array, degree: int) -> Float[Array, "_ n"]:
     """c_k = -1/(l(l+1)) Σ m·∫∇y_k, where ∂(r^l y_k) is at most two harmonics of degree l-1."""
+    *flux, angle = flux_and_angle
     first = angle[None] * _Y0
     if degree == 0:
         return first
@@ -279,6 +319,6 @@ def _from_flux(flux: Float[Array, "3 k n"], angle: Array, degree: int) -> Float[
     below = degree**2 * np.arange(3, dtype=np.int32)[:, None]  # the rows of the axes before
     rows = np.concatenate([table.first_row + below, table.second_row + below])[:, 1:]
     factors = -np.concatenate([table.first, table.second])[:, 1:] / (l * (l + 1))[1:]
-    terms = flux.reshape(3 * degree**2, len(angle)).at[rows].get(mode="promise_in_bounds")
+    terms = flux[0].reshape(3 * degree**2, len(angle)).at[rows].get(mode="promise_in_bounds")
     terms = jnp.asarray(factors, angle.dtype)[..., None] * terms
     return jnp.concatenate([first, functools.reduce(jnp.add, list(terms))])

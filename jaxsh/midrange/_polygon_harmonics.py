@@ -20,14 +20,14 @@ from .._core.checks import (
     check_vectors,
     is_concrete,
 )
-from .._core.xla import in_blocks, rows_at_once
-from ._arcs import pair_bytes
+from .._core.xla import in_blocks, materialize, rows_at_once
+from ._arcs import group_bytes, pair_bytes
 from ._emitters import Polygon, is_convex, unit_normal
 from ._vectors import inverse_power
 from ._visible import Plan, Scene, seen
 
-# Receivers per block: the basis of an arc's nodes stays in cache.
-_BLOCK = 1024
+# Bytes of what is made on the way for one block of receivers.
+_CACHE = 700_000
 # With more arcs than twice as many there are fewer receivers to a block, in proportion.
 _ARCS = 128
 
@@ -210,9 +210,10 @@ def _compiled(scene: Scene, point, normals, radiance, plan: Plan):
     light, *slopes = _unit_lights(scene, rows[0], rows[1], plan)
     lights = [light, *(slope * inverse for slope in slopes)]
     values = []
-    for light in lights:  # (N, K), and (N, K, 3)
-        light = light.reshape(*batch, 1, *light.shape[1:])
-        color = radiance.reshape(3, *(1,) * (len(light.shape) - len(batch) - 1))
+    count = (plan.degree + 1) ** 2
+    for light, shape in zip(lights, ((count,), (count, 3)), strict=False):
+        light = light.reshape(*batch, 1, *shape)
+        color = radiance.reshape(3, *(1,) * len(shape))
         values.append(jnp.multiply(*align(color, light)))
     return tuple(values)
 
@@ -222,11 +223,14 @@ def _inverse_size(vertices: Float[Array, "n 3"]) -> Float[Array, ""]:
 
 
 def _unit_lights(scene: Scene, points, normals, plan: Plan):
-    """(N, K), and (N, K, 3) with the gradient, of radiance 1 at N points, block by block."""
+    """(N, K), and (N, 3K) with the gradient, of radiance 1 at N points, block by block."""
 
     def block(points, normals):
-        lights = seen(scene, points.T, normals.T, plan)
-        return tuple(jnp.moveaxis(light, (-1, -2), (0, 1)) for light in lights)
+        # As one, and in few parts in turn: XLA takes more than eight to the threads of its pool,
+        # which are so short that this costs more than it saves.
+        lights = materialize(functools.partial(seen, plan), scene, points.T, normals.T)
+        rows = (light.reshape(math.prod(light.shape[:-1]), light.shape[-1]).T for light in lights)
+        return tuple(rows)
 
     corners, (count, most) = len(scene.vertices), scene.blockers.shape[:2]
     loops, length = (corners - 2, 3) if plan.triangles else (1, corners)
@@ -234,4 +238,10 @@ def _unit_lights(scene: Scene, points, normals, plan: Plan):
     arcs += loops * count * (most + (not plan.in_front)) * (count + 1 if count > 1 else 1)
     fewer = max(1, arcs // _ARCS)
     most = rows_at_once(fewer * pair_bytes(plan.degree, points.dtype))
-    return in_blocks(block, points, normals, size=max(1, _BLOCK // fewer), most=most)
+    size = max(1, _block(plan.degree, points.dtype) // fewer)
+    return in_blocks(block, points, normals, size=size, most=most)
+
+
+def _block(degree: int, dtype) -> int:
+    """Receivers per block, so that what is made of the arcs taken at once stays in cache."""
+    return min(512, max(32, _CACHE // group_bytes(degree, dtype)) // 16 * 16)

@@ -1,5 +1,6 @@
 """A polygon as receivers see it: above the horizon, beside what stands before it."""
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -8,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from .._core.xla import materialize
 from ._arcs import Arcs, coefficients, coefficients_with_gradient, edge_arcs
 from ._clip import clip_horizon, cut, edges_of, left_over, within
 from ._vectors import close_dot, cross, difference, dot, scale, select, unit
@@ -37,14 +39,35 @@ class Plan(NamedTuple):
 
 
 def seen(
-    scene: Scene, point: Float[Array, "3 n"], horizon: Float[Array, "3 n"], plan: Plan
+    plan: Plan, scene: Scene, point: Float[Array, "3 n"], horizon: Float[Array, "3 n"]
 ) -> list[Array]:
-    """(K, n), and (3, K, n) with the gradient, of the visible part of the light at radiance 1."""
+    """(K, n), and (K, 3, n) with the gradient, of the visible part of the light at radiance 1."""
+    arcs, apex, ahead, active = materialize(
+        functools.partial(_boundary, plan), scene, point, horizon
+    )
+    if plan.gradient:
+        lights = coefficients_with_gradient(arcs, apex, active, plan.degree)
+    else:
+        lights = [coefficients(arcs, apex, active, plan.degree)]
+
+    def on_side(ahead, *lights):
+        # What is seen from behind comes out negative.
+        behind = -1 if plan.two_sided else 0
+        side = jnp.where(ahead < 0, 1, jnp.where(ahead > 0, behind, 0)).astype(ahead.dtype)
+        return [jnp.where(side != 0, side * light, 0) for light in lights]
+
+    return materialize(on_side, ahead, *lights)
+
+
+def _boundary(
+    plan: Plan, scene: Scene, point: Float[Array, "3 n"], horizon: Float[Array, "3 n"]
+) -> tuple[Arcs, Float[Array, "3 n"], Float[Array, " n"], Bool[Array, " arcs"] | None]:
+    """The arcs around what is seen, an apex, 1 for points behind the light, and arcs that count."""
     corners = np.arange(len(scene.vertices), dtype=np.int32)[None]
     if plan.triangles:
         i = corners[0, 1:-1]
         corners = np.stack([np.zeros_like(i), i, i + 1], axis=1)
-    height = _height(scene, point)
+    height = materialize(_height, scene, point)
     ahead = jnp.sign(height)  # 1 for points behind: the plane's normal points away from them
     apex = scale(ahead, scene.plane[0][:, None])
     loops = _outline(scene.vertices[corners], point)
@@ -55,15 +78,7 @@ def seen(
     arcs, active = _flat(loops), None
     if len(scene.blockers):
         arcs, active = _beside_blockers(scene, loops, orient, ahead, point, plan)
-    if plan.gradient:
-        lights = list(coefficients_with_gradient(arcs, apex, active, plan.degree))
-    else:
-        lights = [coefficients(arcs, apex, active, plan.degree)]
-    # What is seen from behind comes out negative.
-    behind = -1 if plan.two_sided else 0
-    side = jnp.where(ahead < 0, 1, jnp.where(ahead > 0, behind, 0)).astype(point.dtype)
-    sides = (side.reshape((1,) * (light.ndim - 1) + side.shape) for light in lights)
-    return [jnp.where(s != 0, s * light, 0) for s, light in zip(sides, lights, strict=True)]
+    return arcs, apex, ahead, active
 
 
 def _beside_blockers(
