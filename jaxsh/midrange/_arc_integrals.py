@@ -105,7 +105,8 @@ def _nodes(count: int, span: Spans) -> list[Nodes]:
     """x, y and z."""
     t = _angles(count)
     cos, sin = (jnp.asarray(f(t), span.sine.dtype)[:, None, None] for f in (np.cos, np.sin))
-    return [cos * span.middle[:, i] + sin * span.tangent[:, i] for i in range(3)]
+    middle, tangent = (jnp.moveaxis(row, -2, 0)[:, None] for row in (span.middle, span.tangent))
+    return [cos * middle[i] + sin * tangent[i] for i in range(3)]
 
 
 def _weights(count: int, sines: Float[Array, "k a n"]) -> Float[Array, "2 j a n"]:
@@ -117,7 +118,7 @@ def _weights(count: int, sines: Float[Array, "k a n"]) -> Float[Array, "2 j a n"
 
 def _sloped_weights(count: int, span: Spans, slope: Array, sines: Float[Array, "k a n"]):
     """Those of ∫ (slope·ω) dt, for even and for odd integrands."""
-    along, across = dot(slope, span.middle), dot(slope, span.tangent)
+    along, across = (dot(slope, row)[None] for row in (span.middle, span.tangent))
     k = np.arange(count + 1)[:, None]
     cos, sin = (f(k * _angles(count)) / count for f in (np.cos, np.sin))
     # What multiplies ∫ cos kt dt: 2 cos t cos k't is cos (k'+1)t + cos (k'-1)t.
@@ -132,10 +133,10 @@ def _sloped_weights(count: int, span: Spans, slope: Array, sines: Float[Array, "
     )
 
 
-def _weigh(table: Float[np.ndarray, "k j"], sines: Float[Array, "k a n"], parity: int) -> Nodes:
+def _weigh(table: Float[np.ndarray, "k j"], sines: Float[Array, "rows a n"], parity: int) -> Nodes:
     """Sum rows k of one parity."""
     terms = [
-        jnp.asarray(table[k], sines.dtype)[:, None, None] * sines[k]
+        jnp.asarray(table[k], sines.dtype)[:, None, None] * sines[k][None]
         for k in range(parity, len(table), 2)
     ]
     if not terms:
@@ -170,6 +171,7 @@ def _zenith(degree: int, z: Nodes, weights: Float[Array, "2 j a n"]):
         jnp.asarray(t[..., rows], z.dtype)[..., None, None, None]
         for t in (table.e, table.f, table.factors)
     )
+    z = z[None]
     value, u = _take(weights, which) * (e * z + f), z * z - 0.5
     for first, *rest in factors:
         value = value * functools.reduce(lambda sum, c: sum * u + c, rest, first)

@@ -265,8 +265,8 @@ def _nothing(start: Rows, *shape: int) -> Array:
     return varying_as(jnp.zeros((*shape, start.shape[-1]), start.dtype), start)
 
 
-def _angle(triangle: Pair) -> Float[Array, " n"]:
-    """The solid angle of an arc's triangle, in [-π, π] as no corner is beyond π/2 of the apex."""
+def _angle(triangle: Pair) -> Float[Array, "a n"]:
+    """The solid angles of arcs' triangles, in [-π, π] as no corner is beyond π/2 of the apex."""
     x, y = triangle  # both zero for a receiver on the edge
     return 2 * jnp.arctan2(y, jnp.where((x == 0) & (y == 0), 1, x))
 

@@ -54,7 +54,8 @@ def seen(
         # What is seen from behind comes out negative.
         behind = -1 if plan.two_sided else 0
         side = jnp.where(ahead < 0, 1, jnp.where(ahead > 0, behind, 0)).astype(ahead.dtype)
-        return [jnp.where(side != 0, side * light, 0) for light in lights]
+        sides = (side.reshape((1,) * (light.ndim - 1) + side.shape) for light in lights)
+        return [jnp.where(s != 0, s * light, 0) for s, light in zip(sides, lights, strict=True)]
 
     return materialize(on_side, ahead, *lights)
 
