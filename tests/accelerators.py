@@ -27,6 +27,7 @@ def faults(module: str, name: str) -> list[str]:
     with pytest.MonkeyPatch.context() as patch:
         # What is traced only where there is an accelerator is traced here.
         patch.setattr("jaxsh.inverse._solve.cpu_alone", lambda: False)
+        patch.setattr("jaxsh._core.xla.cpu_alone", lambda: False)
         traced = jax.jit(with_gradient(call)).trace(*call.arguments)
     found = []
     # Of derivatives too: `test_precision.py` looks at functions alone.

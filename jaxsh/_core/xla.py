@@ -54,7 +54,19 @@ def materialize(function, *arguments):
 
         return jax.lax.cond(never, zeros, function, *arguments)
 
+    if cpu_alone():  # one way to trace: within each other, two ways would be 2^n of them
+        return conditional(*arguments)
     return jax.lax.platform_dependent(*arguments, cpu=conditional, default=function)
+
+
+def as_one(function, *arguments):
+    """`function(*arguments)`, on the CPU a branch of its own in the program.
+
+    XLA gives the kernels of a program or of a branch to the threads of its pool if there are more
+    than eight. Where they are short that costs more time than it saves: in branches of few kernels
+    each they run in turn.
+    """
+    return materialize(function, *arguments) if cpu_alone() else function(*arguments)
 
 
 def rounded_once(function, *arguments):

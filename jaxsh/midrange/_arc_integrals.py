@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._core.host import read_only_cache
-from .._core.xla import in_turn, materialize
+from .._core.xla import as_one, in_turn, materialize
 from ..harmonics import degrees, orders
 from ..harmonics._tables import zenith_table
 from ._arc_nodes import Spans, basis_at, integrate_both, sloped_nodes_of
@@ -69,7 +69,7 @@ def sloped_arc_integrals(
             materialize(weights[1], span, slope, sines),
         )
 
-    (x, y, z), weights, sloped = materialize(prepared, span, slope)
+    (x, y, z), weights, sloped = as_one(prepared, span, slope)
     azimuth = materialize(functools.partial(_azimuth, degree), x, y)
     pull = _integrate(azimuth, z, sloped, degree)
     return (pull, _integrate(azimuth, z, weights, degree - 1)) if degree else (pull,)
@@ -80,9 +80,7 @@ def _sloped_arc_integrals_jvp(degree, primals, tangents):
     """By way of the basis, whose derivatives are right to every order."""
 
     def one_arc(arc):
-        nodes, weights, slopes = materialize(
-            functools.partial(sloped_nodes_of, degree + 2), *arc
-        )
+        nodes, weights, slopes = materialize(functools.partial(sloped_nodes_of, degree + 2), *arc)
         return integrate_both(basis_at(nodes, degree), weights, slopes)
 
     def slowly(span, slope):
@@ -193,7 +191,7 @@ def _integrate(azimuth: Float[Array, "_ j a n"], z: Nodes, weights: Array, degre
         zenith = materialize(functools.partial(_zenith, degree), z, weights)
         return materialize(sum_nodes, azimuth, zenith)
 
-    return materialize(integral, azimuth, z, weights)
+    return as_one(integral, azimuth, z, weights)
 
 
 def _take(rows: Array, index: Int[np.ndarray, " k"]) -> Array:

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .._core.xla import materialize, on_mesh, rows_at_once, varying_as
+from .._core.xla import as_one, materialize, on_mesh, rows_at_once, varying_as
 from ..harmonics import degrees
 from ..harmonics._tables import gradient_table
 from ._arc_integrals import arc_integrals, sloped_arc_integrals
@@ -109,7 +109,7 @@ def coefficients(
         flux, angle = total
         span, normal, triangle = some
         if degree:
-            integral = materialize(functools.partial(arc_integrals, degree=degree - 1), span)
+            integral = as_one(functools.partial(arc_integrals, degree=degree - 1), span)
             flux = flux + materialize(_outer_sum, normal, integral)
         return flux, angle + _sum_rows(_angle(triangle))
 
@@ -158,15 +158,13 @@ def coefficients_with_gradient(
     def add_arcs(total, some):
         pull, *flux, angle = total
         span, normal, near, triangle = some
-        integrals = materialize(functools.partial(sloped_arc_integrals, degree=degree), span, near)
+        integrals = as_one(functools.partial(sloped_arc_integrals, degree=degree), span, near)
         sums = materialize(outer, normal, *integrals)
         added = (a + b for a, b in zip((pull, *flux), sums, strict=True))
         return *added, angle + _sum_rows(_angle(triangle))
 
     lower = [(3, degree**2)] if degree else []
-    nothing = tuple(
-        _nothing(arcs.start, *shape) for shape in (((degree + 1) ** 2, 3), *lower, ())
-    )
+    nothing = tuple(_nothing(arcs.start, *shape) for shape in (((degree + 1) ** 2, 3), *lower, ()))
     spans, triangles = materialize(_spans_and_triangles, arcs, apex)
     each = spans, arcs.normal, arcs.near, triangles
     pull, *flux, angle = _sum(add_arcs, nothing, each, active, degree, _GROUP)
@@ -219,7 +217,7 @@ def _sum(add, total, arcs, active: Bool[Array, " arcs"] | None, degree: int, gro
             arcs = jax.tree.map(lambda a: _fill(a, groups * size), arcs)
             arcs = jax.tree.map(lambda a: a.reshape(groups, size, *a.shape[1:]), arcs)
             if groups == 1:
-                return materialize(once, total, jax.tree.map(lambda a: a[0], arcs))
+                return as_one(once, total, jax.tree.map(lambda a: a[0], arcs))
 
         def add(total, some):
             arcs, used = some
@@ -255,7 +253,7 @@ def _sum(add, total, arcs, active: Bool[Array, " arcs"] | None, degree: int, gro
     return jax.lax.platform_dependent(total, arcs, active, cpu=in_turn, default=together)
 
 
-def _fill(rows: Float[Array, "count *any"], count: int) -> Array:
+def _fill(rows: Float[Array, "..."], count: int) -> Array:
     """Add arcs of zeros, which have no length."""
     return jnp.pad(rows, [(0, count - len(rows))] + [(0, 0)] * (rows.ndim - 1))
 

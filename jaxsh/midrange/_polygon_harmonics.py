@@ -20,7 +20,7 @@ from .._core.checks import (
     check_vectors,
     is_concrete,
 )
-from .._core.xla import in_blocks, materialize, rows_at_once
+from .._core.xla import as_one, in_blocks, rows_at_once
 from ._arcs import group_bytes, pair_bytes
 from ._emitters import Polygon, is_convex, unit_normal
 from ._vectors import inverse_power
@@ -226,9 +226,7 @@ def _unit_lights(scene: Scene, points, normals, plan: Plan):
     """(N, K), and (N, 3K) with the gradient, of radiance 1 at N points, block by block."""
 
     def block(points, normals):
-        # As one, and in few parts in turn: XLA takes more than eight to the threads of its pool,
-        # which are so short that this costs more than it saves.
-        lights = materialize(functools.partial(seen, plan), scene, points.T, normals.T)
+        lights = as_one(functools.partial(seen, plan), scene, points.T, normals.T)
         rows = (light.reshape(math.prod(light.shape[:-1]), light.shape[-1]).T for light in lights)
         return tuple(rows)
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .._core.xla import materialize
+from .._core.xla import as_one, materialize
 from ._arcs import Arcs, coefficients, coefficients_with_gradient, edge_arcs
 from ._clip import clip_horizon, cut, edges_of, left_over, within
 from ._vectors import close_dot, cross, difference, dot, scale, select, unit
@@ -42,9 +42,7 @@ def seen(
     plan: Plan, scene: Scene, point: Float[Array, "3 n"], horizon: Float[Array, "3 n"]
 ) -> list[Array]:
     """(K, n), and (K, 3, n) with the gradient, of the visible part of the light at radiance 1."""
-    arcs, apex, ahead, active = materialize(
-        functools.partial(_boundary, plan), scene, point, horizon
-    )
+    arcs, apex, ahead, active = as_one(functools.partial(_boundary, plan), scene, point, horizon)
     if plan.gradient:
         lights = coefficients_with_gradient(arcs, apex, active, plan.degree)
     else:
