@@ -3,6 +3,7 @@
 import concurrent.futures
 import dataclasses
 import functools
+import itertools
 import os
 import statistics
 from collections.abc import Callable, Iterator
@@ -110,7 +111,7 @@ class Frame(NamedTuple):
 def _exact_on_all_cores(
     lights: tuple[midrange.Polygon, ...], positions: Array, degree: int, gradient: bool
 ) -> tuple[Array, ...]:
-    """Light at each vertex, and its gradient; as many vertices for each core, in threads.
+    """Light at each vertex, and gradients of as many vertices for each core, in threads.
 
     A block of vertices is one thread's work, and XLA gives its other threads none of the blocks.
     """
@@ -121,7 +122,8 @@ def _exact_on_all_cores(
             lambda first, last: _exact(lights, positions[first:last], degree, gradient),
             *(shares[:-1], shares[1:]),
         )
-        return _joined(list(parts))
+        light, *gradients = zip(*parts, strict=True)
+        return _joined(light), *itertools.chain(*gradients)
 
 
 @functools.partial(jax.jit, static_argnums=(2, 3))
@@ -134,7 +136,7 @@ def _exact(lights, positions, degree, gradient):
 
 @jax.jit
 def _joined(parts):
-    return jax.tree.map(lambda *rows: jnp.concatenate(rows), *parts)
+    return jnp.concatenate(parts)
 
 
 @jax.jit
