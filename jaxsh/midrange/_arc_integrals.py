@@ -25,7 +25,7 @@ Nodes = Float[Array, "j a n"]
 
 
 class _Products(NamedTuple):
-    """Which zenith rows there are, and of which two rows each harmonic is the product."""
+    """Name the zenith rows, and the two rows whose product each harmonic is."""
 
     rows: Int[np.ndarray, " rows"]  # those of the harmonics with m >= 0, by their index
     zenith: Int[np.ndarray, " k"]
@@ -108,14 +108,14 @@ def _nodes(count: int, span: Spans) -> list[Nodes]:
 
 
 def _weights(count: int, sines: Float[Array, "k a n"]) -> Float[Array, "2 j a n"]:
-    """Those of ∫ dt, for even and for odd integrands."""
+    """Weigh nodes for ∫ dt, for even and for odd integrands."""
     k = np.arange(count)[:, None]
     table = np.where(k > 0, 2, 1) / count * np.cos(k * _angles(count))
     return jnp.stack([_weigh(table, sines, parity) for parity in (0, 1)])
 
 
 def _sloped_weights(count: int, span: Spans, slope: Array, sines: Float[Array, "k a n"]):
-    """Those of ∫ (slope·ω) dt, for even and for odd integrands."""
+    """Weigh nodes for ∫ (slope·ω) dt, for even and for odd integrands."""
     along, across = (dot(slope, row)[None] for row in (span.middle, span.tangent))
     k = np.arange(count + 1)[:, None]
     cos, sin = (f(k * _angles(count)) / count for f in (np.cos, np.sin))

@@ -111,7 +111,7 @@ def coefficients(
         if degree:
             integral = as_one(functools.partial(arc_integrals, degree=degree - 1), span)
             flux = flux + materialize(_outer_sum, normal, integral)
-        return flux, angle + _sum_rows(_angle(triangle))
+        return flux, angle + _sum_over(0, _angle(triangle))
 
     spans, triangles = materialize(_spans_and_triangles, arcs, apex)
     nothing = _nothing(arcs.start, 3, degree**2), _nothing(arcs.start)
@@ -161,7 +161,7 @@ def coefficients_with_gradient(
         integrals = as_one(functools.partial(sloped_arc_integrals, degree=degree), span, near)
         sums = materialize(outer, normal, *integrals)
         added = (a + b for a, b in zip((pull, *flux), sums, strict=True))
-        return *added, angle + _sum_rows(_angle(triangle))
+        return *added, angle + _sum_over(0, _angle(triangle))
 
     lower = [(3, degree**2)] if degree else []
     nothing = tuple(_nothing(arcs.start, *shape) for shape in (((degree + 1) ** 2, 3), *lower, ()))
@@ -174,18 +174,24 @@ def coefficients_with_gradient(
 
 def _pull(normal: Rows, change: Float[Array, "k a n"]) -> Float[Array, "k 3 n"]:
     """-Σ normal ∫ over the arcs, as a gradient is given: the axis last."""
-    terms = (-normal[a][None] * change[:, a, None] for a in range(len(normal)))
-    return functools.reduce(jnp.add, terms)
+    normal, change = -jnp.moveaxis(normal, 0, 1)[None], change[:, None]
+    return _sum_over(2, normal, change)
 
 
 def _outer_sum(normal: Rows, integrals: Float[Array, "k a n"]) -> Float[Array, "3 k n"]:
     """Σ normal ∫ over the arcs."""
-    terms = (normal[a][:, None] * integrals[None, :, a] for a in range(len(normal)))
-    return functools.reduce(jnp.add, terms)
+    return _sum_over(2, jnp.moveaxis(normal, 0, 1)[:, None], integrals[None])
 
 
-def _sum_rows(rows: Float[Array, "a n"]) -> Float[Array, " n"]:
-    return functools.reduce(jnp.add, list(rows))
+def _sum_over(axis: int, *factors: Array) -> Array:
+    """Sum products over arcs: written out for few, where XLA's sum is slow on the CPU."""
+    count = factors[0].shape[axis]
+    if count > _GROUP:
+        return jnp.sum(functools.reduce(jnp.multiply, factors), axis=axis)
+    rows = [
+        [jax.lax.index_in_dim(f, a, axis, keepdims=False) for f in factors] for a in range(count)
+    ]
+    return functools.reduce(jnp.add, [functools.reduce(jnp.multiply, row) for row in rows])
 
 
 def pair_bytes(degree: int, dtype) -> int:
