@@ -19,9 +19,12 @@ from ._sections import Cores, Rows, Section
 
 # SciPy is measured where one call of it ends in a second or so, e3nn where it compiles in seconds.
 _SCIPY_COUNT, _E3NN_COUNT = 10_000, 10_000
+# Up to here a call of no work is timed beside.
+_SMALL = 100
 
-
-DEGREES, COUNTS = (3, 6, 10, 13), (10_000, 100_000)
+DEGREES, COUNTS = (1, 2, 3, 4, 6, 10, 13), (1, 100, 10_000, 100_000)
+# Derivatives are timed at these alone.
+DERIVED = {(degree, count) for degree in (3, 6, 10, 13) for count in (10_000, 100_000)}
 QUANTITIES = {"values": "#0072B2", "with gradient": "#D55E00", "reverse": "#009E73"}
 CORES = {"one": "one core", "all": "all cores"}
 
@@ -33,7 +36,7 @@ def timings(cores: Cores, rounds: int, dtype: str) -> Iterator[dict[str, Any]]:
 
 
 def _timings(degree: int, count: int, dtype, rounds: int) -> Iterator[dict[str, Any]]:
-    """One row per quantity. Ours is `axis=0`; peers have their own layout."""
+    """One row per quantity. Ours is `axis=0`, values also -1; peers have their own layout."""
     from . import _peers
 
     generator = np.random.default_rng(0)
@@ -44,14 +47,17 @@ def _timings(degree: int, count: int, dtype, rounds: int) -> Iterator[dict[str, 
 
     values = {
         "ours": lambda v: ours(v, degree),
+        "last": lambda v: harmonics.evaluate(v, degree),
         "sphericart": lambda v: _peers.sphericart_values(v, degree),
         "solid": lambda v: _peers.sphericart_solid(v, degree),
         "floor": _writer((degree + 1) ** 2),
     }
-    if count <= _E3NN_COUNT and dtype == np.float32:
+    if count <= _SMALL:
+        values["empty"] = lambda v: v + 1
+    if count == _E3NN_COUNT and dtype == np.float32:
         values["e3nn"] = lambda v: _peers.e3nn_values(v, degree)
     scipy = {}
-    if count <= _SCIPY_COUNT and dtype == np.float64:
+    if count == _SCIPY_COUNT and dtype == np.float64:
         host = np.asarray(vectors)
         scipy["scipy"] = lambda: _peers.scipy_values(host, degree)
     gradients = {
@@ -64,7 +70,9 @@ def _timings(degree: int, count: int, dtype, rounds: int) -> Iterator[dict[str, 
         "sphericart": _peers.pullback(_peers.sphericart_values, degree, cotangent.T),
         "floor": _writer((degree + 1) ** 2),
     }
-    quantities = [("values", values), ("with gradient", gradients), ("reverse", reverse)]
+    quantities = [("values", values)]
+    if (degree, count) in DERIVED:
+        quantities += [("with gradient", gradients), ("reverse", reverse)]
     for quantity, functions in quantities:
         calls = {
             name: functools.partial(jax.jit(function), vectors)
@@ -81,6 +89,10 @@ def _timings(degree: int, count: int, dtype, rounds: int) -> Iterator[dict[str, 
             "over_floor": ratio(times["ours"], times["floor"]),
         }
         peers = ("sphericart", "solid", "e3nn", "scipy")
+        if "last" in times:
+            row["last"] = ratio(times["sphericart"], times["last"])
+        if "empty" in times:
+            row["over_empty"] = max(ratio(times[one], times["empty"]) for one in ("ours", "last"))
         yield row | {
             peer: ratio(times[peer], times["ours"]) if peer in times else None for peer in peers
         }
@@ -98,14 +110,16 @@ def draw(figure: Figure, rows: Rows) -> None:
     for axes, dtype in zip(panels, ("float32", "float64"), strict=True):
         axes.axhspan(1, 8, color="#0072B2", alpha=0.06, lw=0)
         axes.axhline(1, color="0.4", lw=1)
-        for quantity, color in QUANTITIES.items():
+        lines = {name: ("sphericart", name, color) for name, color in QUANTITIES.items()}
+        lines["values, points first"] = "last", "values", "#56B4E9"
+        for label, (key, quantity, color) in lines.items():
             for cores, style in (("one", "-"), ("all", "--")):
                 wanted = {"dtype": dtype, "quantity": quantity, "cores": cores, "count": 10_000}
                 some = page.matching(rows, **wanted)
                 if some:
-                    points = [(row["degree"], row["sphericart"]) for row in some]
-                    label = f"{quantity}, {CORES[cores]}" if dtype == "float32" else None
-                    line = {"color": color, "marker": "o", "label": label}
+                    points = [(row["degree"], row.get(key, np.nan)) for row in some]
+                    said = f"{label}, {CORES[cores]}" if dtype == "float32" else None
+                    line = {"color": color, "marker": "o", "label": said}
                     axes.plot(*zip(*points, strict=True), style, **line)
         axes.set(title=f"{dtype}, 10,000 directions", xlabel="degree", yscale="log", ylim=(0.12, 6))
         axes.set_xticks(sorted({row["degree"] for row in rows}))
@@ -131,12 +145,14 @@ def _by_degree(rows: Rows) -> str:
     degrees = sorted({row["degree"] for row in rows})
     counts = sorted({row["count"] for row in rows})
     lines = []
-    for quantity, count, cores in itertools.product(QUANTITIES, counts, CORES):
+    ratios = {name: (name, "sphericart") for name in QUANTITIES}
+    ratios["values, points first"] = "values", "last"
+    for (label, (quantity, key)), count, cores in itertools.product(ratios.items(), counts, CORES):
         some = page.matching(rows, quantity=quantity, count=count, cores=cores)
-        found = {row["degree"]: row["sphericart"] for row in some}
-        if found:
+        found = {row["degree"]: row[key] for row in some if row.get(key)}
+        if found and count > _SMALL:
             shown = [page.number(found.get(degree), 2) for degree in degrees]
-            lines.append([quantity, f"{count:,}", cores, *shown])
+            lines.append([label, f"{count:,}", cores, *shown])
     return page.table(
         ["quantity", "directions", "cores", f"degree {degrees[0]}", *degrees[1:]], lines
     )
@@ -146,15 +162,18 @@ SECTION = Section(
     name="basis",
     title="The basis",
     intro="Time of sphericart, whose kernels are in C++, over ours, on the same directions: values "
-    "alone, values with their gradients, and a gradient by reverse mode. Ours with `axis=0`.",
+    "alone, values with their gradients, and a gradient by reverse mode. Ours with `axis=0`, "
+    "and where it says points first with `axis=-1`, sphericart's layout.",
     columns=[
         Column("quantity", "quantity"),
         Column("dtype", "dtype"),
         Column("degree", "degree"),
         Column("count", "N"),
-        Column("ours_ms", "ours, ms", digits=2),
+        Column("ours_ms", "ours, ms", digits=3),
         Column("over_floor", "ours / write floor", digits=1),
+        Column("over_empty", "the slower layout / an empty call", digits=2),
         Column("sphericart", "sphericart / ours", digits=2),
+        Column("last", "the same, points first", digits=2),
         Column("solid", "its solid harmonics / ours", digits=2),
         Column("e3nn", "e3nn / ours", digits=1),
         Column("scipy", "SciPy / ours", digits=0),

@@ -87,7 +87,7 @@ def _products(x, y, z, degree: int, shape: tuple[int, int]) -> Float[Array, "...
 def _sum(table: Float[np.ndarray, "terms k"], terms, shape) -> Float[Array, "..."]:
     """Sum of a constant and the terms, of those that any harmonic has."""
     constant, *rows = (jnp.asarray(row.reshape(shape), terms[0].dtype) for row in table)
-    there = table[1:].any(axis=1)
+    there = np.any(table[1:] != 0, axis=1).tolist()
     used = (row * term for row, term, any_ in zip(rows, terms, there, strict=True) if any_)
     return functools.reduce(jnp.add, used, constant)
 
@@ -120,7 +120,7 @@ def _factors(degree: int) -> _Factors:
 
 
 def _azimuth(m: int, sign: int) -> list[Float[np.ndarray, "4"]]:
-    """What the real (sign 1) or imaginary part of (x + iy)^m is a product of, but for x or y.
+    """Factors of the real (sign 1) or imaginary part of (x + iy)^m, but for x or y.
 
     Of even m it is that of (p + 2iq)^(m/2), a product of m/2 lines through zero. Of odd m the lines
     pair up left and right of x or y: x² sin²b - y² cos²b = (p - (1 - z²) cos 2b)/2.

@@ -27,22 +27,23 @@ def solid_rows(
     and NumPy's arrays give NumPy's.
     Derivatives are not those of `_solid`: give a function of these rows a rule of its own.
     """
-    u, rows = z * z - 0.5, [None] * (degree + 1) ** 2
-    azimuth = [(None, None), (x, y)]  # (C_m, S_m)
-    while len(azimuth) <= degree:
+    u = z * z - 0.5
+    rows: list[Any] = [None] * (degree + 1) ** 2
+    azimuth = [(x, y)]  # (C_m, S_m) from m = 1 on
+    while len(azimuth) < degree:
         c, s = azimuth[-1]
         azimuth.append((x * c - y * s, x * s + y * c))
     for m in range(degree + 1):
-        c, s = azimuth[m]
         for l in range(m, degree + 1):
             first, *rest = polynomial(l, m)
             zenith = functools.reduce(lambda value, b: value * u + b, rest, first)
             if (l - m) % 2:
                 zenith = zenith * z
             if m:
+                c, s = azimuth[m - 1]
                 rows[index(l, m)], rows[index(l, -m)] = zenith * c, zenith * s
             else:
-                rows[index(l, 0)] = zenith if l else zenith + 0 * z
+                rows[index(l, 0)] = zenith + 0 * z if l == 0 else zenith
     return rows
 
 
