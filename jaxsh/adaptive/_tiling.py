@@ -110,7 +110,7 @@ def _seen(eye, positions, normals, areas, distant) -> Float[Array, "v 4"]:
     """Tells where each vertex mirrors the eye, and what it weighs."""
     positions, normals = rows_of(positions, normals)
     # Once: below it has two uses, and each would compute it anew for every component.
-    axis = materialize(lambda *seen: mirrored(*seen, distant), eye, positions, normals)
+    axis = materialize(functools.partial(mirrored, distant=distant), eye, positions, normals)
     weights = areas * (jnp.maximum(jnp.sum(normals * axis, axis=0), 0) + 0.05)
     return jnp.concatenate([axis, weights[None].astype(axis.dtype)]).T
 

@@ -38,7 +38,7 @@ def _products(degree: int) -> _Products:
     rows = np.flatnonzero(m >= 0)
     place = np.zeros(len(m), np.int32)
     place[rows] = np.arange(len(rows))
-    zenith = place[l * (l + 1) + abs(m)]
+    zenith = place[(l * (l + 1) + abs(m)).astype(np.int32)]
     azimuth = 2 * abs(m) - (m > 0)  # 1, then the cosine's and the sine's row of each m
     return _Products(rows.astype(np.int32), zenith, azimuth.astype(np.int32))
 

@@ -94,7 +94,7 @@ def _shaded(
     return colors
 
 
-def _on_host(name: str, array: Array) -> np.ndarray:
+def _on_host(name: str, array: Array | np.ndarray) -> np.ndarray:
     # From there it goes to whichever device has the block.
     check_known(name, array)
     return np.asarray(array)
