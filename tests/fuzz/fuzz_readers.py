@@ -5,13 +5,11 @@ import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from fuzz_files import LIGHTS, MESHES, PICTURES
 from fuzz_pictures import CODES
 
 from jaxsh import geometry, imaging, transfer
-from jaxsh.geometry import _assemble
 
 SECONDS = 2.0
 MEMORY = 200 << 20
@@ -20,27 +18,6 @@ _ARRAYS = ("vertices", "faces", "normals", "uv", "colors", "face_material")
 
 class Fault(AssertionError):
     """Says what a reader did that it may not."""
-
-
-def numpy_normals(vertices, faces):
-    """Compute vertex normals in NumPy: JAX compiles its own for each number of vertices anew."""
-    corners = np.asarray(vertices, np.float64)[faces]
-    ahead = np.roll(corners, -1, axis=1) - corners
-    behind = np.roll(corners, 1, axis=1) - corners
-    across = np.cross(ahead, behind)
-    twice_area = np.linalg.norm(across, axis=2, keepdims=True)
-    angle = np.arctan2(twice_area, (ahead * behind).sum(axis=2, keepdims=True))
-    sums = np.zeros(np.shape(vertices))
-    np.add.at(sums, faces, angle * across / np.where(twice_area > 0, twice_area, 1))
-    length = np.linalg.norm(sums, axis=1, keepdims=True)
-    unit = np.where(length > 0, sums / np.where(length > 0, length, 1), [0, 0, 1.0])
-    return jnp.asarray(unit.astype(np.float32))
-
-
-def without_compiling():
-    """Let readers take normals from NumPy, in this process; gives the function to put back."""
-    before, _assemble.vertex_normals = _assemble.vertex_normals, numpy_normals
-    return before
 
 
 def read_path(path: Path) -> Path:

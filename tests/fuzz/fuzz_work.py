@@ -27,9 +27,8 @@ def work(kind, seed, indices, at, stage, spent, found, peers) -> None:
     `at`, `stage` and `spent` say where this process is and how much of a core's time it took.
     """
     import fuzz_peers
-    from fuzz_readers import Fault, check, limit_memory, without_compiling
+    from fuzz_readers import Fault, check, limit_memory
 
-    without_compiling()
     if not os.environ.get("FUZZ_OUTPUT"):  # libraries talk there about damaged files
         for stream in (1, 2):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream)

@@ -9,16 +9,7 @@ import pytest
 from fuzz_archives import compressed_archive
 from fuzz_files import put_beside, seeds
 from fuzz_peers import summary
-from fuzz_readers import check, without_compiling
-
-from jaxsh.geometry import _assemble
-
-
-@pytest.fixture(autouse=True)
-def normals_from_numpy():
-    before = without_compiling()
-    yield
-    _assemble.vertex_normals = before
+from fuzz_readers import check
 
 
 def to(end):

@@ -11,21 +11,12 @@ from fuzz_files import FORMATS, LIGHTS, MESHES, PICTURES, put_beside, seeds
 from fuzz_lights import light
 from fuzz_peers import summary
 from fuzz_pictures import CODES, picture
-from fuzz_readers import check, without_compiling
+from fuzz_readers import check
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from jaxsh.geometry import _assemble
-
 OTHER_SHAPES = [(kind, i) for kind in ("glb", "gltf") for i in range(1, 6)]
-
-
-@pytest.fixture(autouse=True)
-def normals_from_numpy():
-    before = without_compiling()
-    yield
-    _assemble.vertex_normals = before
 
 
 def needs_packages(kind: str) -> None:
