@@ -40,7 +40,7 @@ def evaluate(
     - `vectors`: (..., 3). Differentiable.
     - `degree`: the largest l, known at trace time.
     - `axis`: where the K = (degree+1)² coefficients go: -1 for (..., K), or 0 for (K, ...), the
-      layout that they are computed in, which saves a transpose.
+      layout that degrees above 6 and derivatives are computed in, which saves a transpose.
 
     **Returns** an array of the input's dtype. Derivatives to every order and in every mode are
     finite in every direction, the poles included, as long as |s|^-order fits the dtype. A zero
