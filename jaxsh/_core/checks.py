@@ -174,8 +174,10 @@ def on_host(value: Any) -> np.ndarray | None:
         value = np.asarray(value)  # raises `ValueError` for lists of several lengths
     elif type(value) is not np.ndarray:
         return None
-    plain = value.dtype.kind in "fiu" and value.dtype.itemsize <= 8 and value.dtype.isnative
-    return value if plain else None
+    if value.dtype.kind not in "fiu" or value.dtype.itemsize > 8:
+        return None
+    # Of another byte order, as files of FITS have it, JAX takes none.
+    return value.astype(value.dtype.newbyteorder("="), copy=False)
 
 
 def host_known(*arrays: Array | np.ndarray | None) -> bool:

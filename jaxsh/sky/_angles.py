@@ -59,7 +59,8 @@ def kept(value: Float[ArrayLike, "..."], name: str) -> Float[Array | np.ndarray,
     """
     if isinstance(value, np.ndarray | np.floating | float):
         array = np.asarray(value)
-        if array.dtype.kind == "f":
+        # Of another byte order, `jit` would take the bytes for those of other numbers.
+        if array.dtype.kind == "f" and array.dtype.itemsize <= 8 and array.dtype.isnative:
             check_finite(name, array)
             return array.astype(jax.dtypes.canonicalize_dtype(array.dtype), copy=False)
     return as_finite(value, name)

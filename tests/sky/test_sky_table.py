@@ -165,6 +165,15 @@ def test_out_of_range_and_unknown_names(unchecked):
     assert np.isfinite(traced(sun_at(20), 6.0)).all()
 
 
+def test_numbers_of_another_byte_order_are_read(unchecked):
+    sun = np.asarray(sun_at(20))
+    expected = sky.preetham_harmonics(sun, 3.0)
+    found = sky.preetham_harmonics(sun.astype(sun.dtype.newbyteorder()), np.array(3.0, ">f8"))
+    np.testing.assert_array_equal(found, expected)
+    with pytest.raises(ValueError, match="real numbers for sun"):
+        sky.preetham_harmonics(sun.astype(np.longdouble), 3.0)
+
+
 def test_vmap_over_suns_and_turbidities():
     sun, turbidity = sun_at(np.linspace(0, 90, 7), 30), np.linspace(2.5, 6, 4)
     grid = sky.preetham_harmonics(sun[:, None], turbidity)
