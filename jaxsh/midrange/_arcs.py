@@ -297,6 +297,8 @@ def _spans(arcs: Arcs) -> Spans:
     area = dot(normal, cross(nearer, end - start)) * (inverse_start * inverse_end)
     smaller = jnp.abs(area) * inverse  # sin θ/2, of the other, divided by the larger
     axis = scale(inverse, select(wide, chord, both))
+    # Both ends at the receiver: any axis will do for an arc of no length, but the basis wants one.
+    axis = axis + (inverse == 0).astype(axis.dtype)[..., None, :]
     aside = cross(normal, axis)
     turned = wide & (dot(normal, normal) > 0)  # no normal: a receiver on the edge
     middle, tangent = select(turned, -aside, axis), select(turned, axis, aside)

@@ -198,13 +198,10 @@ def _blockers(
             starts, ends = (jnp.concatenate(x, axis=1) for x in ((start, out), (end, back)))
             return starts, ends, there
 
-        first, second, there = before(1)
+        parts = before(1)
         if plan.two_sided:
-            others = before(-1)
             front = ahead < 0
-            first, second = (
-                jnp.where(front, a, b) for a, b in zip((first, second), others[:2], strict=True)
-            )
-            there = jnp.where(front, there, others[2])
+            parts = (jnp.where(front, a, b) for a, b in zip(parts, before(-1), strict=True))
+        first, second, there = parts
         blocks = blocks & there
     return edge_arcs(first, second, point[None, None]), blocks, -jnp.sign(own)

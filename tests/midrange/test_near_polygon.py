@@ -272,3 +272,39 @@ def test_what_is_not_finite_is_refused(name):
     corners[2, 1] = np.inf
     with pytest.raises(ValueError, match="vertices must be finite"):
         Polygon(corners, ONE)
+
+
+def two_sided_and_reversed():
+    corners = rectangle([0.1, 0.1, 2], [0, 1, 0], [1.1, 0, 0])
+    lights = Polygon(corners, ONE, two_sided=True), Polygon(corners, ONE)
+    blockers = [
+        Polygon(rectangle([0, 0.2, z], [0, 0.3, 0], [0.4, 0, 0.1]), ONE) for z in (1.5, 2.4)
+    ]
+    return *lights, Polygon(corners[::-1], ONE), blockers
+
+
+def test_a_two_sided_light_takes_blockers():
+    light, *_, blockers = two_sided_and_reversed()
+    shape = jax.eval_shape(lambda p: polygon_harmonics(light, p, 0, blockers=blockers), np.zeros(3))
+    assert shape.shape == (3, 1)
+
+
+@pytest.mark.slow
+def test_a_two_sided_light_behind_blockers_is_one_of_either_side():
+    light, front, back, blockers = two_sided_and_reversed()
+    for z, one in ((0.3, front), (4.0, back)):
+        point = np.array([[0.2, 0.1, z]])
+        expected = polygon_harmonics(one, point, 2, blockers=blockers)
+        assert np.abs(expected - polygon_harmonics(one, point, 2)).max() > 0.01
+        found = polygon_harmonics(light, point, 2, blockers=blockers)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+
+
+@pytest.mark.slow
+def test_reverse_mode_at_a_corner_above_a_horizon():
+    light, up = Polygon(LAMP, ONE), np.array([0, 0.6, 0.8])
+    points = jnp.asarray(np.stack([LAMP[0], [0, 0, -1]]))
+    found = jax.grad(lambda p: polygon_harmonics(light, p, 1, horizon=up).sum())(points)
+    assert not found[0].any()
+    assert np.isfinite(found[1]).all()
+    assert found[1].any()
