@@ -79,6 +79,8 @@ def make_tiling(
     block = _usual(transfer, num_tiles) if block is None else check_size("block", block)
     check_known("make_tiling", transfer, eye)
     eye = checked_eye(eye, transfer.positions.dtype)
+    if not transfer.num_points:
+        raise ValueError("expected a transfer of at least one point, got one of none")
     if areas is None:
         areas = vertex_areas(transfer)
     elif not isinstance(areas, Array):

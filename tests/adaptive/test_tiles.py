@@ -243,6 +243,9 @@ def test_tiles_refuse_what_does_not_fit(ball, light, unchecked):
             make_tile_atlas(ball, **wrong)
     with pytest.raises(ValueError, match="a view from 0 to 1, got 2"):
         make_tile_atlas(ball, views=2, num_tiles=2).tiling(2)
+    none = transfer.unshadowed(np.zeros((0, 3)), np.zeros((0, 3)), degree=2)
+    with pytest.raises(ValueError, match="at least one point"):
+        make_tiles(none, EYE)
     with pytest.raises(ValueError, match="num_tiles must be an integer >= 1"):
         make_tiles(ball, EYE, num_tiles=0)
     with pytest.raises(ValueError, match="eye"):
