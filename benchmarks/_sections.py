@@ -14,7 +14,16 @@ Rows = list[dict[str, Any]]
 
 # Each is the module of that name, with a `SECTION`. They import peers in their functions: the page
 # is made where there are none.
-NAMES = ("basis", "synthesis", "errors", "lat_long", "first_call", "first_picture")
+NAMES = (
+    "basis",
+    "synthesis",
+    "errors",
+    "lat_long",
+    "bake",
+    "near_light",
+    "first_picture",
+    "first_call",
+)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Exact light of polygons at many vertices, beside sums over as many samples of their surface."""
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import jax
@@ -35,8 +35,8 @@ def timings(cores: Cores, rounds: int, dtype: str) -> Iterator[dict[str, Any]]:
     for degree in DEGREES:
         for quantity, ours, theirs in zip(QUANTITIES, exact, summed, strict=True):
             calls = {
-                "exact": functools.partial(ours, square, points, degree),
-                "sampled": functools.partial(theirs, samples, points, degree),
+                "exact": _jitted(ours, square, points, degree),
+                "sampled": _jitted(theirs, samples, points, degree),
             }
             times = interleaved(calls, rounds=rounds)
             first, other = (jax.tree.leaves(calls[name]())[0] for name in calls)
@@ -49,6 +49,12 @@ def timings(cores: Cores, rounds: int, dtype: str) -> Iterator[dict[str, Any]]:
                 "error": float(jnp.abs(other - first).max() / jnp.abs(first).max()),
                 "compile_s": times["exact"].first_seconds,
             }
+
+
+def _jitted(function: Callable[..., Any], light: Any, points: jax.Array, degree: int):
+    return functools.partial(
+        jax.jit(lambda light, points: function(light, points, degree)), light, points
+    )
 
 
 def draw(figure: Figure, rows: Rows) -> None:
