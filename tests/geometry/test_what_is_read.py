@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from fuzz_files import seeds
-from fuzz_readers import without_compiling
 from gltf_writer import CORNERS, FACES, Gltf
 from PIL import Image
 from test_gltf_packed import GRID, accessor, packed
 
-from jaxsh.geometry import _assemble, read_mesh
+from jaxsh.geometry import read_mesh
 from jaxsh.geometry._files._write import _FORMATS
 from jaxsh.geometry._read import _PARSERS
 
@@ -318,13 +317,6 @@ TRIED: dict[tuple[str, str], tuple[Any, Any]] = {
     ),
     ("other columns", ".off"): (off(more=" 7"), "1 further values of each vertex ignored"),
 }  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def normals_from_numpy():
-    before = without_compiling()
-    yield
-    _assemble.vertex_normals = before
 
 
 def test_every_claim_is_tried():
