@@ -233,7 +233,6 @@ SECTION = Section(
         Column("mesh", "mesh"),
         Column("degree", "degree"),
         Column("directions", "directions"),
-        Column("cores", "cores"),
         Column("part", "part"),
         Column("rays", "rays, millions", digits=1),
         Column("first_s", "first call, CPU, s", digits=3),
