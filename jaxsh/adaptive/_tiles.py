@@ -44,8 +44,8 @@ def make_tiles(
     - `eye`: a point, or with `distant` the direction to an eye far away.
     - `num_tiles`: more are more exact.
     - `block`: the number of vertices that a tile's size is a multiple of; by default 64, and a
-      smaller power of two for a small mesh. Devices that share the
-      vertices share it too, down to 16, so that their tiles are as narrow as one device's.
+      smaller power of two for a small mesh. Devices that share the vertices share it too, down to
+      16, so that their tiles are as narrow as one device's.
     - `components`: numbers of a vertex that its glossy part is made of. More are more exact, and
       cost more per frame.
     - `exponent`: of the lobes to come. Others are less exact.

@@ -33,7 +33,7 @@ def synthesize(
 
     What shading does with the basis: the colors of a million splats, each with coefficients and a
     direction of its own, or one light at a million normals. The same as `evaluate` and a sum over
-    K, but the basis is not held as a whole, neither here nor for reverse mode.
+    K, but on one device the basis is not held as a whole, neither here nor for reverse mode.
 
     **Arguments**
 

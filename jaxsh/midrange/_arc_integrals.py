@@ -1,6 +1,6 @@
 """Integrals of harmonics along great-circle arcs, seen by many receivers, without derivatives.
 
-Equations (3) and (6) of docs/near_light_polygons.md. At a node a harmonic is a product of two
+Equations (3) and (5) of docs/near_light_polygons.md. At a node a harmonic is a product of two
 rows, an azimuth row of x and y and a zenith row of z alone, and only the latter takes the weight.
 So few rows are made, each of them by all arcs and receivers, and an integral over n nodes is n
 products of two of them.
@@ -57,7 +57,7 @@ def arc_integrals(span: Spans, degree: int) -> Float[Array, "k a n"]:
 def sloped_arc_integrals(
     span: Spans, slope: Float[Array, "a 3 n"], degree: int
 ) -> tuple[Float[Array, "k a n"], ...]:
-    """∫ y_k (slope·ω) dt, eq. (6), and ∫ y_k dt for all degrees but the last."""
+    """∫ y_k (slope·ω) dt, eq. (5), and ∫ y_k dt for all degrees but the last."""
 
     def prepared(span, slope):
         count = degree + 1

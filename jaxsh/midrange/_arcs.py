@@ -1,6 +1,6 @@
 """Integrals of harmonics over a region of the sphere, from the great-circle arcs around it.
 
-Derived in docs/near_light_polygons.md, whose equations (1) to (5) are named here. Exact for arcs
+Derived in docs/near_light_polygons.md, whose equations (1) to (6) are named here. Exact for arcs
 of any length below π: there is nothing to split.
 """
 
@@ -56,10 +56,10 @@ class Arcs(NamedTuple):
 def edge_arcs(first: Vectors, second: Vectors, point: Vectors) -> Arcs:
     """The arcs of edges from s to e, seen from the receiver: normal s×e/|s×e|, line f/|f|².
 
-       f is the foot of the receiver on the edge's line.
-    Both are zero for an edge that points at the receiver or has no length. In float32 they are
-       right to rounding down to |f| = 1e-4 of the distance of the corners: what the differences
-       leave counts, since s and e are almost parallel there.
+    f is the foot of the receiver on the edge's line. Both are zero for an edge that points at the
+    receiver or has no length. In float32 they are right to rounding down to |f| = 1e-4 of the
+    distance of the corners: what the differences leave counts, since s and e are almost parallel
+    there.
     """
     # Stored, since each component of what follows takes all of it.
     start, end, along, area = materialize(_between, first, second, point)
@@ -101,7 +101,7 @@ def coefficients(
     `apex` is a direction no further than π/2 from all of the region. Arcs that are not `active`
     have no length for any receiver.
 
-    The derivative is eq. (5): the arcs' ends carry their points, whose speed across the arc is
+    The derivative is eq. (6): the arcs' ends carry their points, whose speed across the arc is
     all that counts.
     """
 
@@ -128,7 +128,7 @@ def _coefficients_jvp(degree, primals, tangents):
 
 
 def _rate(arcs: Arcs, moves: Arcs, active: Array | None, degree: int):
-    """Σ ∫ y_k v dt, eq. (5). The speed v across an arc is linear in ω, as 1/r and λ/r are."""
+    """Σ ∫ y_k v dt, eq. (6). The speed v across an arc is linear in ω, as 1/r and λ/r are."""
     start, end, normal, line, _ = arcs
     along = end - start
     # λ/r for the point start + λ (end - start): 0 at the start, 1/r at the end.
