@@ -33,7 +33,8 @@ def run(tmp_path):
 def test_table1(run):
     folder, rows = run("table1", "--frames", "1", "--directions", "16")
     [model], stages = rows[:1], rows[1:]
-    assert [row["way"] for row in stages] == ["without", "with", "exact per vertex"]
+    ways = ["without", "with", "exact per vertex", "exact with gradient"]
+    assert [row["way"] for row in stages] == ways
     for row in stages[:2]:
         parts = [row[stage] for stage in ("trace", "project", "shade", "raster", "draw")]
         assert min(parts) > 0

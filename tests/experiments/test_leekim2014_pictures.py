@@ -80,14 +80,15 @@ def test_figure8(run):
 
 @pytest.mark.slow
 def test_figure10(run):
-    options = ["--frames", "3", "--sheet", "2", "--views", "2", "--windows", "none", "sinc"]
+    options = ["--frames", "3", "--sheet", "2", "--views", "64", "--windows", "none", "sinc"]
     folder, rows = run("leekim2014.figure10", *ROW, *options)
     by = {(row["window"], row["method"]): row for row in rows}
     for window in ("none", "sinc"):
         assert by[window, "levels"]["psnr"] > 100
         # Their first stage is all of degree 3: what is lost is lost to eight bits.
         assert by[window, "two_stage"]["psnr"] > 60
-        assert by[window, "tiles"]["psnr"] > 60
+        # Sets of 64 views are up to some 15 degrees away from the eye: 31.9.
+        assert by[window, "tiles"]["psnr"] > 30
         assert by[window, "probes"]["psnr"] > 25
         for name in ("levels", "levels, hysteresis"):
             assert 0 <= by[window, name]["switched"] < 1

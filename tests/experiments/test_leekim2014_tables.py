@@ -32,7 +32,7 @@ from experiments.runner.context import Context
 
 # All at degree 4 but table2, so that they share what is compiled.
 OPTIONS = {
-    "table1": ["--methods", "masks", "tiles", "--views", "2"],
+    "table1": ["--methods", "masks", "tiles", "--views", "64"],
     "table2": ["--degrees", "2", "--methods", "two_stage"],
     "threshold": ["--methods", "two_stage", "--variants", "smoothed"],
     "exponent": ["--methods", "tiles", "--exponents", "8", "1000"],
