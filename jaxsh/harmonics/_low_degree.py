@@ -57,12 +57,16 @@ def _reciprocals(vectors: Float[Array, "n 3"]) -> Float[Array, " n"]:
     x, y, z = (vectors[:, i] for i in range(3))
     largest = jnp.maximum(jnp.maximum(jnp.abs(x), jnp.abs(y)), jnp.abs(z))
     third = jnp.finfo(x.dtype).maxexp // 3
-    number = functools.partial(jnp.asarray, dtype=x.dtype)
-    power = jnp.where(largest < 2.0**-third, number(2.0 ** (2 * third)), number(1))
-    power = jnp.where(largest > 2.0**third, number(2.0 ** (-2 * third)), power)
-    divisor = jnp.where(largest < 2.0**-third, number(2.0 ** (-2 * third)), number(1))
-    divisor = jnp.where(largest > 2.0**third, number(-(2.0 ** (2 * third - 8))), divisor)
-    divisor = jnp.where(largest < np.inf, divisor, number(np.nan))
+    small, large = largest < 2.0**-third, largest > 2.0**third
+
+    def one_but(condition, value):
+        """Chooses of two scalars: JAX 0.12 cannot of one and rows that devices share."""
+        value, one = jnp.asarray(value, x.dtype), jnp.asarray(1, x.dtype)
+        return jnp.where(condition, value, one)
+
+    power = one_but(small, 2.0 ** (2 * third)) * one_but(large, 2.0 ** (-2 * third))
+    divisor = one_but(small, 2.0 ** (-2 * third)) * one_but(large, -(2.0 ** (2 * third - 8)))
+    divisor = divisor * one_but(~(largest < np.inf), np.nan)
     x, y, z = x * power, y * power, z * power
     # A quotient, since XLA computes those once, where it would make a product anew for each use.
     return jnp.sqrt(1 / (x * x + y * y + z * z)) / divisor
