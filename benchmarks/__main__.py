@@ -35,7 +35,7 @@ class Options:
     """one: pinned to a core; all: free to use every one; wall clock in both"""
     allocator: Literal["keeping", "default"] = "keeping"
     """keeping: freed pages stay with the process, where a section has it so; default: as glibc"""
-    rounds: int = 9
+    rounds: int = 5
     """interleaved rounds per row"""
     out: Path = Path("results/benchmarks")
     """where the report goes"""

@@ -214,7 +214,8 @@ def draw(figure: Figure, rows: Rows) -> None:
     left.axhline(1, color="0.4", lw=1)
     left.set_xticks(range(len(meshes)), meshes)
     left.set(ylabel="CPU time over that of its rays alone", title="2,048 directions, degree 10")
-    left.legend(title="cores", loc="lower right")
+    left.set_ylim(0, 1.7)
+    left.legend(title="cores", ncols=2, frameon=False, loc="upper center")
     parts = [row for row in rows if row.get("first_s") is not None and row["part"] != WHOLE]
     names = [row["part"] for row in parts]
     right.barh(names, [1e3 * row["first_s"] for row in parts], color="#56B4E9", label="first call")
