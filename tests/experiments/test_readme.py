@@ -63,19 +63,15 @@ def test_where_README_says_that_sphericart_is_faster():
     even = ratios("one", {2, 3}, "sphericart", "last")
     assert 0.85 < even.min() < even.max() < 1.25
     assert ratios("one", {4, 6, 10, 13}, "sphericart", "last").min() > 1
-    assert "sphericart is three to five times as fast up to degree 3" in " ".join(TEXT.split())
-    slower = ratios("all", {1, 2, 3}, "sphericart", "last")
-    assert 1 / 5 < slower.min() < slower.max() < 1 / 2.9
     assert "in most of float64 on two cores it is the faster" in " ".join(TEXT.split())
     assert np.mean(theirs(dtype="float64", cores="all")) > 0.5
 
 
 def test_what_differs_is_told():
-    wrong = TEXT.replace("| 1.18 | 1.00 |", "| 1.18 | 1.94 |")
-    assert wrong != TEXT
-    [said] = readme.unlike(wrong)
-    assert "1.94" in said
-    assert "1.18 | 1.00" in said
+    line = next(line for line in TEXT.splitlines() if line.startswith("| values, one core |"))
+    [said] = readme.unlike(TEXT.replace(line, f"{line[:-6]}9.94 |"))
+    assert "9.94" in said
+    assert line in said
     said = readme.unlike(TEXT + "\n![Another](docs/images/layouts_cubes.png)\n")
     assert "does not say which command draws docs/images/layouts_cubes.png" in said[-1]
 
