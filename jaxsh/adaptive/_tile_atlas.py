@@ -97,8 +97,10 @@ def make_tile_atlas(
 ) -> TileAtlas:
     """Make tilings for `views` directions, spread evenly over the sphere.
 
-    The eyes stand at `distance` from the center of the mesh's box, or far away (default). Other
-    arguments and errors as for `make_tiles`; raises `ValueError` for fewer than one view too.
+    The eyes stand at `distance` from the center of the mesh's box, or far away (default). Of 128
+    views the nearest to an eye is 0.12 radians away on average, of 32 twice as far: farther than
+    tiles are made for, which is plain to see. Other arguments and errors as for `make_tiles`;
+    raises `ValueError` for fewer than one view too.
 
     **Example**
 
