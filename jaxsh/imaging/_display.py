@@ -166,8 +166,11 @@ def _known_exposure(image: np.ndarray, mask: Any, percentile: float) -> np.ndarr
     brightest = functools.reduce(np.maximum, np.moveaxis(image, -1, 0))
     brightest = brightest.ravel() if mask is None else brightest[np.asarray(mask)]
     brightest = brightest[~np.isnan(brightest)]
-    level = np.percentile(brightest, percentile) if len(brightest) else 0
-    return np.asarray(1 / level if level > 0 else 1)
+    with np.errstate(over="ignore", invalid="ignore"):  # as XLA computes
+        level = np.percentile(brightest, percentile) if len(brightest) else 0
+        if np.isnan(level):  # between infinite ones NumPy takes a difference
+            level = np.percentile(brightest, percentile, method="lower")
+        return np.asarray(1 / level if level > 0 else 1)
 
 
 def psnr(

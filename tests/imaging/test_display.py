@@ -122,6 +122,14 @@ def test_auto_exposure_takes_the_percentile_of_the_object_to_one(rng, dtype):
     assert np.isfinite(jax.grad(auto_exposure)(image, mask)).all()
 
 
+def test_auto_exposure_of_infinite_pixels_is_the_same_without_a_program():
+    image = jnp.ones((2, 2, 3)).at[0].set(jnp.inf)
+    program = jax.jit(auto_exposure, static_argnames="percentile")
+    for percentile, expected in ((99.0, 0), (20.0, 1)):
+        assert auto_exposure(image, percentile=percentile) == expected
+        assert program(image, percentile=percentile) == expected
+
+
 def test_auto_exposure_of_nothing_is_one():
     black = jnp.zeros((3, 3, 3))
     assert auto_exposure(black) == 1
