@@ -49,7 +49,7 @@ def claimed(folder: Path, about: dict[str, Any]) -> Iterator[None]:
     """Hold a folder for a dataset: a new one, or one of the same settings that a run has left.
 
     Raises `UserError` for anything else, which stays as it is, and where another run holds it
-    (where the system has locks of files that end with the process, as all but Windows have).
+    (where system and file system have locks of files that end with the process; Windows has none).
     """
     path = folder / ABOUT
     if not path.exists():
@@ -58,13 +58,15 @@ def claimed(folder: Path, about: dict[str, Any]) -> Iterator[None]:
         if folder.exists() and any(".part" not in entry.name for entry in folder.iterdir()):
             raise UserError(f"{str(folder)!r} holds no dataset: move it or choose --folder")
         words(path, about)
-    with open(path, encoding="utf-8") as file:
+    with open(path, "r+", encoding="utf-8") as file:  # NFS locks only what may be written
         if fcntl:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
+            except BlockingIOError as error:
                 busy = f"another run is making {str(folder)!r}: wait for it or choose --folder"
                 raise UserError(busy) from error
+            except OSError:  # a file system without locks
+                pass
         _check_same(folder, file.read(), about)
         for part in folder.rglob("*.part*"):  # of a run that was killed
             part.unlink(missing_ok=True)

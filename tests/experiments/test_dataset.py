@@ -1,5 +1,6 @@
 """Datasets: cameras and lights as files tell them, folders that go on, pictures made again."""
 
+import errno
 import hashlib
 import json
 import os
@@ -94,6 +95,19 @@ def test_one_run_at_a_time_in_a_folder(tmp_path):
         assert part.exists()
     take(tmp_path / "new", about)
     assert not part.exists()
+
+
+def test_a_file_system_without_locks_is_no_other_run(tmp_path, monkeypatch):
+    fcntl = pytest.importorskip("fcntl")
+    asked = []
+
+    def refuse(file, _):
+        asked.append(file.name)
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    take(tmp_path, {"settings": {"views": 2}})
+    assert asked == [str(tmp_path / writing.ABOUT)]
 
 
 @pytest.mark.parametrize(
