@@ -37,8 +37,9 @@ def materialize(function, *arguments):
 
     Fused, it would be computed anew for every row of the consumer. On the CPU a conditional is a
     boundary that XLA keeps, where it drops `lax.optimization_barrier`. The other branch is never
-    taken: `isnan(x) & (x > 0)` is always false, but XLA cannot prove it. On a mesh of devices the
-    function is called as it is, since a conditional would gather what is sharded.
+    taken: `isnan(x) & (x > 0)` is always false, but XLA cannot prove it, unless x, of the first
+    array, is a constant. On accelerators the function is called as it is; so it is on a mesh of
+    devices, since a conditional would gather what is sharded.
     """
     function = jax.jit(function)  # traced once for all the uses below
     if on_mesh(arguments):

@@ -223,7 +223,7 @@ def _sum(add, total, arcs, active: Bool[Array, " arcs"] | None, degree: int, gro
             arcs = jax.tree.map(lambda a: _fill(a, groups * size), arcs)
             arcs = jax.tree.map(lambda a: a.reshape(groups, size, *a.shape[1:]), arcs)
             if groups == 1:
-                return as_one(once, total, jax.tree.map(lambda a: a[0], arcs))
+                return once(total, jax.tree.map(lambda a: a[0], arcs))
 
         def add(total, some):
             arcs, used = some
