@@ -4,7 +4,6 @@ import concurrent.futures
 import dataclasses
 import functools
 import itertools
-import os
 import statistics
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, TypeVar
@@ -18,6 +17,7 @@ from jaxsh import geometry, imaging, midrange, transfer
 
 from ..runner import Context, Table, experiment
 from ..shared.lights import exact_light
+from ..shared.process import cores
 from ..shared.subjects import Subject, load
 from ..shared.timing import timed
 from .scenes import three_lights
@@ -115,9 +115,9 @@ def _exact_on_all_cores(
 
     A block of vertices is one thread's work, and XLA gives its other threads none of the blocks.
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    shares = [int(share) for share in np.linspace(0, len(positions), (cores or 1) + 1)]
-    with concurrent.futures.ThreadPoolExecutor(cores) as pool:
+    threads = cores()
+    shares = [int(share) for share in np.linspace(0, len(positions), threads + 1)]
+    with concurrent.futures.ThreadPoolExecutor(threads) as pool:
         parts = pool.map(
             lambda first, last: _exact(lights, positions[first:last], degree, gradient),
             *(shares[:-1], shares[1:]),
