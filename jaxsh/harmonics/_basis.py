@@ -20,11 +20,8 @@ from .._core.checks import as_float, check_degree, check_vectors, described
 from .._core.vectors import components_first, normalize
 from .._core.xla import materialize, on_mesh
 from ._indexing import degrees
-from ._low_degree import coefficients_first, points_first
+from ._low_degree import LOW_DEGREE, coefficients_first, points_first
 from ._tables import azimuth_table, gradient_table, zenith_table
-
-# Values up to here are computed in one pass over the vectors.
-_LOW_DEGREE = 6
 
 
 def evaluate(
@@ -100,7 +97,7 @@ def _evaluate(vectors, degree, axis):
         return jax.vmap(lambda v: _evaluate(v, degree, axis), out_axes=1 + axis)(vectors)
     flat, count = vectors.reshape(-1, 3), (degree + 1) ** 2
     values = (
-        _values(flat, degree, axis) if 0 < degree <= _LOW_DEGREE else _by_rows(flat, degree, axis)
+        _values(flat, degree, axis) if 0 < degree <= LOW_DEGREE else _by_rows(flat, degree, axis)
     )
     batch = vectors.shape[:-1]
     return values.reshape((count, *batch) if axis == 0 else (*batch, count))

@@ -22,6 +22,9 @@ from ._indexing import index
 from ._polynomials import polynomial
 from ._tables import _positive_roots
 
+# Up to here four sums are enough.
+LOW_DEGREE = 6
+
 
 class _Factors(NamedTuple):
     """Coefficients along K of the sums that a harmonic is the product of."""
@@ -35,7 +38,7 @@ def points_first(vectors: Float[Array, "n 3"], degree: int) -> Float[Array, "n k
     """Harmonics of vectors of any length, coefficients last."""
     reciprocal = _reciprocals(vectors)[:, None]
     x, y, z = (_shortened(vectors[:, i : i + 1], reciprocal) for i in range(3))
-    return _products(x, y, z, degree, (1, -1))
+    return products(x, y, z, degree, (1, -1))
 
 
 def coefficients_first(vectors: Float[Array, "n 3"], degree: int) -> Float[Array, "k n"]:
@@ -46,7 +49,7 @@ def coefficients_first(vectors: Float[Array, "n 3"], degree: int) -> Float[Array
         return jnp.stack([_shortened(vectors[:, i], reciprocal) for i in range(3)])
 
     x, y, z = materialize(units, vectors)[:, None]
-    return _products(x, y, z, degree, (-1, 1))
+    return products(x, y, z, degree, (-1, 1))
 
 
 def _reciprocals(vectors: Float[Array, "n 3"]) -> Float[Array, " n"]:
@@ -78,7 +81,7 @@ def _shortened(component: Float[Array, "..."], reciprocal: Float[Array, "..."]):
     return component * reciprocal * jnp.where(reciprocal < 0, back, one)
 
 
-def _products(x, y, z, degree: int, shape: tuple[int, int]) -> Float[Array, "..."]:
+def products(x, y, z, degree: int, shape: tuple[int, int]) -> Float[Array, "..."]:
     """All harmonics of unit vectors, with K along the axis where `shape` has -1."""
     factors = _factors(degree)
     squares = z * z, (x - y) * (x + y), x * y

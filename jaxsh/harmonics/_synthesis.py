@@ -19,8 +19,9 @@ from .._core.linalg import einsum, matmul
 from .._core.xla import in_blocks, materialize, rows_at_once
 from ._basis import evaluate
 from ._indexing import degree_of
+from ._low_degree import products
 from ._polynomials import solid_rows
-from ._tables import azimuth_table, gradient_table, zenith_table
+from ._tables import gradient_table
 
 # Longer sums of few functions are no longer vectorized on a CPU.
 _WRITTEN_OUT = 4
@@ -76,7 +77,11 @@ def _change(subscripts: str, turned, primals, tangents) -> Float[Array, "n c"]:
     degree = degree_of(coefficients.shape[-1])
 
     def changed(change, unit):
-        return einsum(subscripts, change, _basis(_stored(unit), degree))
+        x, y, z = _stored(unit)
+        basis = products(x, y, z, degree, (1, -1))
+        # One row at degree 0, where nothing depends on the vector.
+        basis = jnp.broadcast_to(basis, (unit.shape[1], basis.shape[1]))
+        return einsum(subscripts, change, basis)
 
     parts = []
     if not isinstance(change, SymbolicZero):
@@ -148,25 +153,6 @@ def _components(turn, unit) -> list[Float[Array, " n"]]:
 
 def _stored(unit):
     return materialize(lambda unit: unit, unit)
-
-
-def _basis(unit: Float[Array, "3 n 1"], degree: int) -> Float[Array, "n k"]:
-    """The basis, coefficients last: all rows have one form (see `_tables`), side by side."""
-    x, y, z = unit
-    table = zenith_table(degree)
-
-    def constants(array):
-        return jnp.asarray(array, x.dtype)[..., None, :]
-
-    u = z * z - 0.5
-    lone, *factors = (np.concatenate(list(t))[table.azimuth_row].T for t in azimuth_table(degree))
-    a, b, c, d = constants(lone)
-    basis = (a + b * x + (c + d * x) * y) * (constants(table.e) * z + constants(table.f))
-    for alpha, beta, gamma in zip(*map(constants, factors), strict=True):
-        basis = basis * (alpha * (x * x) + beta * (y * y) + gamma)
-    for first, *rest in constants(table.factors):
-        basis = basis * functools.reduce(lambda value, b: value * u + b, rest, first)
-    return basis
 
 
 @read_only_cache(maxsize=None)

@@ -18,10 +18,11 @@ from .._core.vectors import normalize
 from .._core.xla import in_blocks, on_mesh, rows_at_once
 from ._basis import evaluate
 from ._indexing import degree_of
+from ._low_degree import LOW_DEGREE
 from ._synthesis import by_products, per_point, shared
 
-# Up to here sums are written out.
-_LOW_DEGREE, _FEW_FUNCTIONS = 6, 4
+# More functions are multiplied with the basis.
+_FEW_FUNCTIONS = 4
 # Vectors per block on a CPU. Blocks of coefficients are copied, so that few are better.
 _BLOCK = 2**17
 
@@ -93,7 +94,7 @@ def _shared(rows: Float[Array, "b k"], vectors: Float[Array, "*points 3"]):
             return einsum("bk,k...->...b", rows, evaluate(vectors, degree, axis=0))
         return matmul(rows, evaluate(vectors, degree, axis=0)).T
     vectors = vectors.reshape(-1, 3)
-    if degree <= _LOW_DEGREE and len(rows) <= _FEW_FUNCTIONS:
+    if degree <= LOW_DEGREE and len(rows) <= _FEW_FUNCTIONS:
         return shared(rows, _units(vectors))
     return by_products(rows, vectors)
 
@@ -107,7 +108,7 @@ def _per_point(coefficients, vectors):
     flat = jnp.broadcast_to(coefficients, (*batch, *coefficients.shape[-2:]))
     flat = flat.reshape(math.prod(batch), *coefficients.shape[-2:])
     vectors = jnp.broadcast_to(vectors, (*batch, 3)).reshape(-1, 3)
-    if degree <= _LOW_DEGREE:
+    if degree <= LOW_DEGREE:
         values = per_point(flat, _units(vectors))
     else:
 
