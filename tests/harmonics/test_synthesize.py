@@ -31,13 +31,17 @@ def by_evaluate(coefficients, vectors):
     "degree", [3, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 4, 5, 7))]
 )
 def test_values_are_those_of_scipy_for_all_batches(degree, rng):
-    """Float64 to 4e-15 (measured 2e-15), float32 to 4e-6 (measured 1.5e-6)."""
+    """Float64 to 4e-15 up to degree 4 (measured 3.2e-15), to 2e-14 above (1.1e-14, at degree 7).
+
+    Float32 to 4e-6 (measured 1.5e-6).
+    """
+    tolerance = 4e-15 if degree <= 4 else 2e-14
     for leading, shape in SHAPES if degree == 4 else SHAPES[:4]:
         c, vectors = rng.normal(size=(*leading, (degree + 1) ** 2)), rng.normal(size=shape)
         basis = oracles.scipy_basis(vectors, degree)
         expected = (np.expand_dims(basis, -2) * c).sum(-1) if leading else basis @ c
         found = harmonics.synthesize(c, vectors)
-        np.testing.assert_allclose(found, expected, 0, 2e-14, strict=True)
+        np.testing.assert_allclose(found, expected, 0, tolerance, strict=True)
         if degree == 3 and leading in ((3,), (6, 3)):
             found = harmonics.synthesize(c.astype(np.float32), vectors)
             np.testing.assert_allclose(found, expected.astype(np.float32), 0, 4e-6, strict=True)
