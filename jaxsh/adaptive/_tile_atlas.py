@@ -1,5 +1,6 @@
 """Tile sets for a camera that moves: split beforehand for many views, the nearest taken."""
 
+import math
 from collections.abc import Iterator
 
 import equinox as eqx
@@ -12,16 +13,18 @@ from .._core.checks import check_number, check_size, check_type
 from ..sphere import fibonacci
 from ..transfer import AbstractTransfer, Transfer, quantize
 from ..transfer._glossy_kernels import checked_eye
-from ._local_rule import check_rule, local_rule
+from ._local_rule import FARTHEST, check_rule, local_rule, num_tiles_for
 from ._method import check_known
 from ._sharing import sharing
 from ._tile_samples import places
 from ._tile_set import TileSet
-from ._tiles import COMPONENTS, EXPONENT, arrange, arranged_in_slices
-from ._tiling import NUM_TILES, Tiling, make_tiling, vertex_areas
+from ._tiles import EXPONENT, arrange, arranged_in_slices
+from ._tiling import Tiling, make_tiling, vertex_areas
 
 # Slices of a set on an accelerator: at 50,000 vertices and degree 10 one is some 3,000 vertices.
 _SLICES = 16
+# How far from the nearest of n directions of `fibonacci` any is at most, times √n.
+_APART = 2.7
 
 
 class TileAtlas(eqx.Module):
@@ -45,8 +48,9 @@ class TileAtlas(eqx.Module):
     axes: Float[Array, "views tiles 3"]
     eyes: Float[Array, "views 3"]  # directions from the center to each eye
     center: Float[Array, " 3"]  # of the mesh's box; zero where the eyes are far away
-    components: int = eqx.field(static=True)
+    components: int | None = eqx.field(static=True)
     exponent: float = eqx.field(static=True)
+    reach: float = eqx.field(static=True)
 
     def view(self, eye: Float[ArrayLike, " 3"]) -> int:
         """Return the number of the view whose direction is nearest to that of `eye`."""
@@ -81,6 +85,7 @@ class TileAtlas(eqx.Module):
             self.tiling(view),
             components=self.components,
             exponent=self.exponent,
+            reach=self.reach,
             diffuse=diffuse,
         )
 
@@ -90,17 +95,18 @@ def make_tile_atlas(
     *,
     distance: float | None = None,
     views: int = 128,
-    num_tiles: int = NUM_TILES,
+    num_tiles: int | None = None,
     block: int | None = None,
-    components: int = COMPONENTS,
+    components: int | None = None,
     exponent: float = EXPONENT,
+    reach: float | None = None,
 ) -> TileAtlas:
     """Make tilings for `views` directions, spread evenly over the sphere.
 
     The eyes stand at `distance` from the center of the mesh's box, or far away (default). Of 128
-    views the nearest to an eye is 0.12 radians away on average, of 32 twice as far: farther than
-    tiles are made for, which is plain to see. Other arguments and errors as for `make_tiles`;
-    raises `ValueError` for fewer than one view too.
+    views the nearest to an eye is 0.12 radians away on average and 0.24 at most, of 32 twice as
+    far; `reach` is that most by default, up to 0.5. Other arguments and errors as for
+    `make_tiles`; raises `ValueError` for fewer than one view too.
 
     **Example**
 
@@ -111,10 +117,13 @@ def make_tile_atlas(
     >>> atlas.nearest(made, atlas.eyes[1]).samples.shape
     (4, 9, 16)
     """
-    check_rule(components, exponent)
+    views = check_size("views", views)
+    reach = min(_APART / math.sqrt(views), FARTHEST) if reach is None else reach
+    check_rule(components, exponent, reach)
     check_type("transfer", transfer, Transfer)
     check_known("make_tile_atlas", transfer)
-    views = check_size("views", views)
+    if num_tiles is None:
+        num_tiles = num_tiles_for(transfer.degree, exponent)
     if distance is not None:
         distance = check_number("distance", distance, above=0.0)
     towards = fibonacci(views).directions.astype(transfer.positions.dtype)
@@ -133,7 +142,7 @@ def make_tile_atlas(
         jnp.stack([getattr(one, name) for one in tilings])
         for name in ("permutation", "tile", "axes")
     )
-    return TileAtlas(permutation, tile, axes, towards, center, components, exponent)
+    return TileAtlas(permutation, tile, axes, towards, center, components, exponent, reach)
 
 
 class TileFollower:
@@ -219,7 +228,7 @@ class TileFollower:
             place = places(self._permutation[view], made.num_points, None)
         else:
             place = self._places[view]
-        rule = local_rule(made.degree, atlas.components, atlas.exponent)
+        rule = local_rule(made.degree, atlas.components, atlas.exponent, atlas.reach)
         return arranged_in_slices(
             made, atlas.tiling(view), place, rule, self._diffuse, self._slices
         )

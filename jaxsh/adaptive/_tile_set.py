@@ -52,6 +52,7 @@ class TileSet(eqx.Module):
     scales: Float[Array, "blocks n"]  # a number of a vertex is sample times scale
     lights: Float[Array, "k tiles m"]  # the rule's, around each tile's axis
     core: Float[Array, "bands m g n"]  # of the rule
+    functions: Float[Array, "g monomials"]
     reach: Float[Array, ""]
     positions: Float[Array, "3 places"]
     normals: Float[Array, "3 places"]  # at unit length
@@ -128,7 +129,7 @@ def _shade_tiles(light, eye, material, tiles, distant, normalized, shared):
         shared,
         (None, None, None, None, 0, 1),
         0,
-        *(light, eye, core, tiles.reach, rows, points),
+        *(light, eye, core, (tiles.functions, tiles.reach), rows, points),
     )
     albedo = material.specular
     albedo = albedo if albedo.ndim == 2 else albedo.reshape(1, -1)
@@ -141,10 +142,10 @@ def _shade_tiles(light, eye, material, tiles, distant, normalized, shared):
     return AdaptiveResult(color, {}, jnp.asarray(cost, color.dtype))
 
 
-def _glossy(distant, light, eye, core, reach, rows, points):
+def _glossy(distant, light, eye, core, within, rows, points):
     """Computes the glossy part of the rows at hand."""
     tile, axes, place, samples, scales = rows
-    of_tiles, positions, normals = points
+    (functions, reach), (of_tiles, positions, normals) = within, points
     (width, count, numbers), (blocks, _, size) = of_tiles.shape, samples.shape
     tile, place = own(tile, count), own(place, blocks * size)
 
@@ -155,7 +156,7 @@ def _glossy(distant, light, eye, core, reach, rows, points):
     axis, normals = materialize(seen, eye, positions, normals)
     middle, wide, changes = placed(axis, normals, tile, turns(axes))
     lights = matmul(light, of_tiles.reshape(width, -1)).reshape(3, count, numbers)
-    weights = tile_weights(jnp.swapaxes(lights, 0, 1), core, middle, wide, reach)
+    weights = tile_weights(jnp.swapaxes(lights, 0, 1), core, functions, middle, wide, reach)
     weights = weights[tile] * jnp.tile(scales, (1, len(ORDERS)))[:, None]
     glossy = materialize(lobe_sums, weights, samples, changes)
     # Rows of four, since a gather of three takes one number at a time.

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, Int
 
 from .._core.linalg import matmul
 from .._core.xla import materialize
-from ._local_rule import disc, monomials
+from ._local_rule import degree_of_monomials, disc, monomials
 
 # Beside the cosine of facing the eye, what a vertex counts for in its tile's middle.
 _AWAY = 0.05
@@ -57,16 +57,17 @@ def placed(
 def tile_weights(
     lights: Float[Array, "tiles 3 m"],
     core: Float[Array, "m g n"],
+    functions: Float[Array, "g monomials"],
     middle: Float[Array, "tiles 2"],
     width: Float[Array, " tiles"],
     reach: Float[Array, ""],
 ) -> Float[Array, "tiles 3 rows"]:
     """Computes the weights of 1, u, w, u², u w and w², those of all n for one after the other.
 
-    The rule's polynomials of B about a tile's axis become quadratic ones about its middle, by
+    The rule's functions of B about a tile's axis become quadratic ones about its middle, by
     least squares over its width; beyond the rule's reach they stay as they are on its border.
     """
-    points = disc(_POINTS)
+    points, degree = disc(_POINTS), degree_of_monomials(functions.shape[1])
     fit = np.linalg.pinv(np.stack(monomials(points[:, 0], points[:, 1], 2), axis=-1))
 
     def changing(middle, width):
@@ -75,9 +76,9 @@ def tile_weights(
             for i in range(2)
         )
         within = 1 / jnp.sqrt(jnp.maximum(x * x + y * y, reach**2))
-        at = jnp.stack(monomials(x * within, y * within), axis=1)
+        at = jnp.stack(monomials(x * within, y * within, degree), axis=1)
         fitted = matmul(at.reshape(-1, _POINTS), jnp.asarray(fit.T, at.dtype))
-        return fitted.reshape(*at.shape[:2], -1)
+        return matmul(functions, fitted.reshape(*at.shape[:2], -1))
 
     changes, (tiles, channels, _) = changing(middle, width), lights.shape
     whole = matmul(lights.reshape(tiles * channels, -1), core.reshape(len(core), -1))

@@ -23,7 +23,8 @@ def test_atlas_takes_the_nearest_view(ball):
         assert atlas.view(eye) == view
     eye = atlas.center + 3.0 * atlas.eyes[3]
     expected = make_tiling(ball, eye, num_tiles=4, block=32)
-    expected = arrange(ball, expected, components=7, exponent=9.0)
+    expected = arrange(ball, expected, components=7, exponent=9.0, reach=atlas.reach)
+    assert atlas.reach == 0.5  # of few views
     jax.tree.map(np.testing.assert_array_equal, atlas.nearest(ball, eye), expected)
 
 

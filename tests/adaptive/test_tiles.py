@@ -42,7 +42,7 @@ MATERIAL = transfer.Material(jnp.asarray(0.5), jnp.asarray([0.5, 0.3, 0.1]), jnp
 
 @pytest.mark.parametrize(
     ("dtype", "tolerance"),
-    [pytest.param(jnp.float32, 4e-7, marks=pytest.mark.slow), (jnp.float64, 3e-7)],
+    [pytest.param(jnp.float32, 6e-7, marks=pytest.mark.slow), (jnp.float64, 3e-7)],
     ids=["float32", "float64"],
 )
 def test_tiles_of_one_vertex_with_all_numbers_are_nearly_exact(ball, light, dtype, tolerance):
@@ -61,7 +61,7 @@ def test_tiles_of_one_vertex_with_all_numbers_are_nearly_exact(ball, light, dtyp
 
 def test_a_frame_is_the_rule_as_it_is_written(rng):
     """Tile by tile by hand, for two eyes: polynomials about the middle by least squares."""
-    degree, exponent, count = 4, 16.0, 70
+    exponent, count = 16.0, 70
     normals = sphere.fibonacci(count).directions.at[3].set(jnp.nan)
     rows = jnp.asarray(rng.normal(size=(count, 25)))
     made = transfer.Transfer(rows, jnp.nan_to_num(normals), normals, jnp.zeros((count, 1), int))
@@ -72,8 +72,9 @@ def test_a_frame_is_the_rule_as_it_is_written(rng):
     )
     eyes = jnp.asarray([EYE, EYE + 0.2])
     ours = np.asarray(jax.vmap(lambda eye: tiles(light, eye, material).color)(eyes))
-    core = np.tensordot(harmonics.phong(exponent, degree, normalized=True), tiles.core, 1)
-    order = np.asarray(tiles.tiling.permutation)
+    core = np.tensordot(harmonics.phong(exponent, 4, normalized=True), tiles.core, 1)
+    degree = _local_rule.degree_of_monomials(tiles.functions.shape[1])
+    order, reach = np.asarray(tiles.tiling.permutation), float(tiles.reach)
     for eye, got in zip(eyes, ours, strict=True):
         axis = np.asarray(transfer.reflected_direction(eye, made.positions, made.normals))
         facing = np.sum(np.nan_to_num(normals) * axis, axis=1)
@@ -86,9 +87,9 @@ def test_a_frame_is_the_rule_as_it_is_written(rng):
             width = np.sqrt(2 * share @ np.sum((at - middle) ** 2, axis=1) / share.sum())
             points = _local_rule.disc(9)
             there = middle + width * points
-            there /= np.maximum(np.linalg.norm(there, axis=1) / 0.25, 1)[:, None]
-            powers = np.stack(_local_rule.monomials(*there.T / 0.25), axis=-1)
-            weights = np.einsum("pg,mgn->pmn", powers, core)
+            there /= np.maximum(np.linalg.norm(there, axis=1), reach)[:, None]
+            values = tiles.functions @ np.stack(_local_rule.monomials(*there.T, degree))
+            weights = np.einsum("gp,mgn->pmn", values, core)
             fit = np.linalg.lstsq(quadratic(points), weights.reshape(9, -1), rcond=None)[0]
             there = (quadratic((at - middle) / width) @ fit).reshape(len(at), *weights.shape[1:])
             lights = np.asarray(light) @ np.asarray(tiles.lights)[:, tile]
@@ -125,7 +126,7 @@ def test_error_falls_with_the_numbers_and_with_the_tiles(ball, light):
         color = made(light, EYE, material).color
         errors.append(np.sqrt(np.mean((color - full) ** 2)) / np.std(full))
     assert errors[0] > 2 * errors[1] > 4 * errors[2]
-    assert errors[2] < 5e-6
+    assert errors[2] < 9e-6
     assert errors[2] < errors[3] < 0.02
 
 

@@ -17,7 +17,7 @@ def ball():
 def calls():
     a = adaptive
     made, flags = ball(), {"distant": True, "normalized": True}
-    rule = {"components": 9, "exponent": 8.0}
+    rule = {"components": 9, "exponent": 8.0, "reach": 0.3}
     tiling = {"num_tiles": 2, "block": 8}
     frame = {"light": floats(3, K), "eye": eye(), "material": transfer.Material(0.5, 0.5, 8.0)}
     anchors, tiles = a.make_anchors(made), a.make_tiles(made, eye(), **tiling, **rule)
