@@ -29,9 +29,9 @@ _POLES, _SWEEPS = 72, 2
 _LOST, _MULTIPLE = 0.024, 4
 # Polynomials of where a lobe points, up to such a degree, and then the functions that are sums of
 # them, may lose so much, squared, beside what the numbers lose, or beside rounding.
-_MOST, _BESIDE, _OF_FEW, _ROUNDED = 7, 0.05, 0.35, 1e-4
+_MOST, _BESIDE, _OF_FEW, _ROUNDED = 7, 0.05, 0.7, 1e-4
 # Lobes whose degree deviates so much take the usual number of tiles, sharper ones more, by a power.
-_BLUNT, _SHARPER, _MOST_TILES = 6.5, 3.0, 1200
+_BLUNT, _SHARPER, _MOST_TILES = 6.5, 2.5, 1200
 
 
 class LocalRule(NamedTuple):

@@ -20,8 +20,9 @@ from ._splits import split as tiles_of
 # Vertices per block: a tile holds whole blocks, so that shapes depend on neither tiles nor eye.
 BLOCK = 64
 NUM_TILES = 400
-# Of a small mesh, blocks are smaller, down to this.
-_SMALLEST = 8
+# Of a small mesh, blocks are smaller; of one that would have fewer than 16 vertices in each, this:
+# its normals differ so much from vertex to vertex that a tile's border must not be rounded.
+_SMALLEST = 4
 # Vertices of a block at least, where devices share out the vertices and those of their blocks.
 _LEAST = 16
 
@@ -119,8 +120,8 @@ def _seen(eye, positions, normals, areas, distant) -> Float[Array, "v 4"]:
 
 def _usual(transfer: Transfer, num_tiles: int) -> int:
     """Returns the largest block, a power of two, that leaves blocks enough to choose tiles from."""
-    each = max(transfer.num_points / (1.6 * num_tiles), _SMALLEST)
-    return min(BLOCK, 2 ** int(math.log2(each)))
+    each = transfer.num_points / (1.6 * num_tiles)
+    return min(BLOCK, 2 ** int(math.log2(each))) if each >= 16 else _SMALLEST
 
 
 def _towards(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:

@@ -53,6 +53,7 @@ def tile_set(made, tiling, lights, rows):
         scales=scales,
         lights=lights,
         core=jnp.zeros((DEGREE + 1, LIGHTS, 15, COMPONENTS), jnp.float32),
+        functions=jnp.zeros((15, 28), jnp.float32),
         reach=jnp.ones((), jnp.float32),
         positions=positions,
         normals=normals,
