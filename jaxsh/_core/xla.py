@@ -207,6 +207,35 @@ def block_by_block(function, *arrays, size: int, out: int = 0):
     return jax.tree.map(join, done)
 
 
+def in_slices(function, *arrays, size: int):
+    """`function(*arrays)` as `in_blocks`, for blocks so large that the arrays are not to be copied.
+
+    Each block is sliced out of the arrays, and the last one ends with them: it has rows in common
+    with the block before.
+    """
+    rows = arrays[0].shape[0]
+    count, length = math.ceil(rows / size), equal_blocks(rows, size)
+
+    def block(start, *arrays):
+        return function(*(jax.lax.dynamic_slice_in_dim(a, start, length) for a in arrays))
+
+    def loop(*arrays):
+        starts = jnp.minimum(jnp.arange(count) * length, rows - length)
+        anew = jax.checkpoint(lambda start: block(start, *arrays), prevent_cse=False)
+        blocks = jax.lax.map(anew, starts)
+
+        def join(blocks):
+            ahead = (count - 1) * length
+            most = blocks[:-1].reshape(ahead, *blocks.shape[2:])
+            return jnp.concatenate([most, blocks[-1, length - (rows - ahead) :]])
+
+        return jax.tree.map(join, blocks)
+
+    if cpu_alone():
+        return loop(*arrays)
+    return jax.lax.platform_dependent(*arrays, cpu=loop, default=jax.checkpoint(function))
+
+
 def keep_rows(function, *arguments, like, axis: int, out) -> Any:
     """`function(*arguments)`, with the rows of its results sharded as those of `like` are.
 

@@ -14,7 +14,6 @@ from .._core.checks import (
     flatten_batch,
 )
 from .._core.linalg import einsum, matmul
-from .._core.vectors import normalize
 from .._core.xla import in_blocks, on_mesh, rows_at_once
 from ._basis import evaluate
 from ._indexing import degree_of
@@ -95,7 +94,7 @@ def _shared(rows: Float[Array, "b k"], vectors: Float[Array, "*points 3"]):
         return matmul(rows, evaluate(vectors, degree, axis=0)).T
     vectors = vectors.reshape(-1, 3)
     if degree <= LOW_DEGREE and len(rows) <= _FEW_FUNCTIONS:
-        return shared(rows, _units(vectors))
+        return shared(rows, vectors)
     return by_products(rows, vectors)
 
 
@@ -109,7 +108,7 @@ def _per_point(coefficients, vectors):
     flat = flat.reshape(math.prod(batch), *coefficients.shape[-2:])
     vectors = jnp.broadcast_to(vectors, (*batch, 3)).reshape(-1, 3)
     if degree <= LOW_DEGREE:
-        values = per_point(flat, _units(vectors))
+        values = per_point(flat, vectors)
     else:
 
         def block(coefficients, vectors):
@@ -118,8 +117,3 @@ def _per_point(coefficients, vectors):
         most = rows_at_once(math.prod(flat.shape[1:]) * flat.dtype.itemsize)
         values = in_blocks(block, flat, vectors, size=_BLOCK, most=most)
     return values.reshape(*batch, coefficients.shape[-2])
-
-
-def _units(vectors: Float[Array, "n 3"]) -> Float[Array, "3 n 1"]:
-    """Components first, each a column that broadcasts along functions."""
-    return normalize(vectors.T[:, :, None])[0]

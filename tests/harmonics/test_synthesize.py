@@ -7,6 +7,7 @@ import oracles
 import pytest
 
 from jaxsh import harmonics
+from jaxsh.harmonics import _synthesis
 
 # Coefficients and vectors: shared by all, one for each, batches of shared ones, single vectors.
 SHAPES = [
@@ -67,13 +68,32 @@ def derivatives(f, c, vectors, change, turn):
 @pytest.mark.slow
 def test_derivatives_in_every_mode_and_order(degree, leading, rng):
     """Against the sum over `evaluate`, whose rules are another way; at a pole, too."""
-    c, vectors = rng.normal(size=(*leading, (degree + 1) ** 2)), rng.normal(size=(6, 3))
+    check_derivatives(degree, leading, 6, rng)
+
+
+def check_derivatives(degree, leading, count, rng):
+    c, vectors = rng.normal(size=(*leading, (degree + 1) ** 2)), rng.normal(size=(count, 3))
     vectors[0] = 0.0, 0.0, -2.0
     arguments = c, vectors, rng.normal(size=c.shape), rng.normal(size=vectors.shape)
     found = jax.jit(lambda *x: derivatives(harmonics.synthesize, *x))(*arguments)
     expected = jax.jit(lambda *x: derivatives(by_evaluate, *x))(*arguments)
     scale = max(float(jnp.abs(leaf).max()) for leaf in jax.tree.leaves(expected)) + 1
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, 0, 1e-14 * scale), found, expected)
+
+
+@pytest.mark.parametrize("leading", [(7, 2), (2,)])
+@pytest.mark.slow
+def test_derivatives_slice_by_slice(leading, rng, monkeypatch):
+    """Of more vectors than are computed at once, in slices of which the last two overlap."""
+    monkeypatch.setattr(_synthesis, "_AT_ONCE", 0)
+    monkeypatch.setattr(_synthesis, "_SLICE", 3 * 9 * 8)
+    check_derivatives(2, leading, 7, rng)
+    c, vectors = rng.normal(size=(2, *leading, 9)), rng.normal(size=(2, 7, 3))
+    grad = jax.grad(lambda c, v: jnp.sum(harmonics.synthesize(c, v) ** 2), (0, 1))
+    assert "dynamic_slice" in str(jax.make_jaxpr(grad)(c[0], vectors[0]))
+    alone = [grad(*pair) for pair in zip(c, vectors, strict=True)]
+    for found, *expected in zip(jax.vmap(grad)(c, vectors), *alone, strict=True):
+        np.testing.assert_allclose(found, jnp.stack(expected), 0, 1e-12)
 
 
 @pytest.mark.parametrize("leading", [(4, 2), (2,)])
