@@ -36,11 +36,16 @@ def picture(path: Path, image: Any) -> int:
     return path.stat().st_size
 
 
+def _as_text(content: Any) -> str:
+    """Say content as JSON."""
+    return json.dumps(content, indent=1) + "\n"
+
+
 def words(path: Path, content: Any) -> None:
     """Write JSON, put in place when it is whole."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    part.write_text(_as_text(content), encoding="utf-8")
     part.replace(path)
 
 
@@ -52,13 +57,15 @@ def claimed(folder: Path, about: dict[str, Any]) -> Iterator[None]:
     (where system and file system have locks of files that end with the process; Windows has none).
     """
     path = folder / ABOUT
-    if not path.exists():
-        if folder.exists() and not folder.is_dir():
-            raise UserError(f"{str(folder)!r} is a file: choose another --folder")
-        if folder.exists() and any(".part" not in entry.name for entry in folder.iterdir()):
-            raise UserError(f"{str(folder)!r} holds no dataset: move it or choose --folder")
-        words(path, about)
-    with open(path, "r+", encoding="utf-8") as file:  # NFS locks only what may be written
+    if folder.exists() and not folder.is_dir():
+        raise UserError(f"{str(folder)!r} is a file: choose another --folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    others = any(".part" not in entry.name for entry in folder.iterdir())
+    if others and not path.exists():  # in this order: another run may just have begun
+        raise UserError(f"{str(folder)!r} holds no dataset: move it or choose --folder")
+    # Made if need be and written once it is held, never replaced: of runs that start together all
+    # open one file. NFS locks only what may be written.
+    with open(path, "a+", encoding="utf-8") as file:
         if fcntl:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -67,7 +74,12 @@ def claimed(folder: Path, about: dict[str, Any]) -> Iterator[None]:
                 raise UserError(busy) from error
             except OSError:  # a file system without locks
                 pass
-        _check_same(folder, file.read(), about)
+        file.seek(0)
+        if found := file.read():
+            _check_same(folder, found, about)
+        else:
+            file.write(_as_text(about))
+            file.flush()
         for part in folder.rglob("*.part*"):  # of a run that was killed
             part.unlink(missing_ok=True)
         yield

@@ -7,7 +7,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -95,6 +97,28 @@ def test_one_run_at_a_time_in_a_folder(tmp_path):
         assert part.exists()
     take(tmp_path / "new", about)
     assert not part.exists()
+
+
+def test_runs_that_start_together_do_not_share_a_folder(tmp_path):
+    """Of eight that wait for each other one has it, in each of 20 folders."""
+    pytest.importorskip("fcntl")
+    about, runs = {"settings": {"views": 2}}, 8
+    start, tried = (threading.Barrier(runs, timeout=20) for _ in range(2))
+
+    def run(folder) -> bool:
+        start.wait()
+        try:
+            with writing.claimed(folder, about):
+                tried.wait()
+                return True
+        except UserError:
+            tried.wait()
+            return False
+
+    with ThreadPoolExecutor(runs) as pool:
+        for folder in (tmp_path / str(count) for count in range(20)):
+            assert sum(pool.map(run, [folder] * runs)) == 1
+            take(folder, about)
 
 
 def test_a_file_system_without_locks_is_no_other_run(tmp_path, monkeypatch):

@@ -39,7 +39,14 @@ def test_project_is_the_generic_sum(height, width, rng):
 def test_a_picture_that_is_folded(columns, rng, monkeypatch):
     """Of high degree, on a CPU: in a loop over two blocks, and in one."""
     degree, channels = 21, columns // 24  # another shape each, which is compiled anew
+    blocks, fold = [], _folds._folded
+
+    def folded(*arguments):
+        blocks.append(arguments[-1])
+        return fold(*arguments)
+
     monkeypatch.setattr(_folds, "_BLOCK", 22 * columns * channels)
+    monkeypatch.setattr(_folds, "_folded", folded)
     image, pull = rng.normal(size=(44, 96, channels)), rng.normal(size=(channels, 484))
     project = functools.partial(sphere.project_lat_long, degree=degree)
     found, derivative = jax.jvp(project, (image,), (2 * image,))
@@ -50,6 +57,7 @@ def test_a_picture_that_is_folded(columns, rng, monkeypatch):
     directions, weights = sphere.lat_long(44, 96).directions, sphere.lat_long(44, 96).weights
     expected = np.asarray(weights)[:, None] * (basis(directions, degree) @ pull.T)
     np.testing.assert_allclose(back, expected.reshape(image.shape), rtol=0, atol=1e-14)
+    assert set(blocks) == {columns}
 
 
 @pytest.mark.parametrize(("height", "width"), SIZES)
