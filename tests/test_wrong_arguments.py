@@ -50,6 +50,7 @@ def of_wrong_kind(value: Any) -> Iterator[tuple[str, Any]]:
         yield from [("text", "2"), ("half", 2.5), ("array", jnp.ones(3)), ("a list", [2])]
     elif isinstance(value, float):
         yield from [("text", "abc"), ("complex", 1j), ("a long array", np.ones(7))]
+        yield "more than any float", 10**400
     else:
         yield from [("None", None), ("text", "abc"), ("an array", jnp.ones(3))]
         if isinstance(value, eqx.Module):

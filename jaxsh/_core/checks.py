@@ -15,14 +15,18 @@ from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
 from .host import put
+from .known import at_hand, is_concrete, on_host
 from .words import article, described, nearest, said_dtype
 
 # A light, an eye, a few thousand albedos: looking at more would take time of every call.
 _FEW = 2**16
 _SHORT = 256
 _ON_HOST = "this runs on the host, before jit, vmap and grad"
-# The JAX array that was last found right for a name and a bound: arrays do not change.
-_right: dict[tuple[str, float | None], weakref.ref[Any]] = {}
+# What floats of any size hold.
+_HELD = 65504.0
+_LARGEST = float(np.finfo(np.float32).max)
+# The JAX array that was last found right for a name, a dtype and a bound: arrays do not change.
+_right: dict[tuple[Any, ...], weakref.ref[Any]] = {}
 
 
 def as_float(value: Any, name: str = "") -> Float[Array, "..."]:
@@ -31,6 +35,8 @@ def as_float(value: Any, name: str = "") -> Float[Array, "..."]:
     Raises `ValueError` for what is no array of real numbers, and for integers of 8 and 16 bits:
     those are the codes of a picture, which mean nothing as they are.
     """
+    if type(value) is int:  # JAX's integers may be too short for it
+        value = np.asarray(as_double(name or "a number", value), jnp.result_type(float))
     # What is a JAX array already is looked at in every frame.
     array = value if isinstance(value, Array) else _as_array(value, name)
     if jnp.issubdtype(array.dtype, jnp.floating):
@@ -88,7 +94,7 @@ def _as_host_array(value: Any, name: str, wanted: str) -> np.ndarray:
     check_known(name, value)
     try:
         return np.asarray(value)
-    except (TypeError, ValueError):  # lists of several lengths
+    except (TypeError, ValueError, OverflowError):  # lists of several lengths
         raise ValueError(f"expected {wanted} for {name}, got {described(value)}") from None
 
 
@@ -99,45 +105,60 @@ def check_known(name: str, value: Any) -> None:
 
 
 def as_finite(
-    value: Any, name: str, *, least: float | None = None, wait: bool = False
+    value: Any, name: str, *, dtype: Any = None, least: float | None = None, wait: bool = False
 ) -> Float[Array, "..."]:
-    """Convert as `as_float` does, and check as `check_finite` does."""
+    """Convert as `as_float` does, or to a dtype, and check as `check_finite` does for that."""
+    if type(value) in (int, float):  # of which JAX would make infinity with a warning
+        value = as_double(name, value)
+        check_finite(name, value, dtype=jnp.result_type(float) if dtype is None else dtype)
     array = as_float(value, name)
+    dtype = array.dtype if dtype is None else dtype
     # What was given on the host is looked at there, wherever its copy goes.
     on_host = not isinstance(value, Array) and (
         isinstance(value, np.ndarray | float)
         or not any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value))
     )
-    check_finite(name, value if on_host else array, least=least, wait=wait)
-    return array
+    check_finite(name, value if on_host else array, dtype=dtype, least=least, wait=wait)
+    # To cast to the same type does nothing, but takes time of every frame.
+    return array if array.dtype == dtype else array.astype(dtype)
 
 
-def check_finite(name: str, value: Any, *, least: float | None = None, wait: bool = False) -> None:
+def check_finite(
+    name: str, value: Any, *, dtype: Any = None, least: float | None = None, wait: bool = False
+) -> None:
     """Raises `ValueError` where a value that is at hand is NaN, infinite or below `least`.
+
+    So does one that is infinite in the `dtype` which it is to be converted to.
 
     At hand are arrays of up to 65,536 numbers on the host or on CPU devices of this process. With
     `wait`, for what is made once, also larger ones and those on an accelerator, which has to finish
     them first. What is traced is not looked at, nor a JAX array that came for this name the last
     time. `tools/measure_checks.py` prints what that costs a call.
     """
-    if isinstance(value, float) and math.isfinite(value) and (least is None or value >= least):
+    if isinstance(value, float) and abs(value) <= _HELD and (least is None or value >= least):
         return
     if isinstance(value, Array):
-        last = _right.get((name, least))
+        last = _right.get((name, dtype, least))
         if last is not None and last() is value:
             return
         if not (is_concrete(value) if wait else at_hand(value)):
             return
-    array = np.asarray(value)
+    array = given = np.asarray(value)
     if array.size > _FEW and not wait:
         return
+    if dtype is not None and array.dtype != dtype:
+        with np.errstate(over="ignore", invalid="ignore"):
+            array = array.astype(dtype)
     if not _fine(array, least):
-        wrong = array[~(np.isfinite(array) & (True if least is None else array >= least))]
-        bound = "" if least is None else f" and >= {least:g}"
+        places = ~(np.isfinite(array) & (True if least is None else array >= least))
+        wrong = given[places]
+        became = np.isfinite(wrong[0]) and not np.isfinite(array[places][0])
+        bound = f" in {array.dtype}" if became else ""
+        bound += "" if least is None else f" and >= {least:g}"
         where = f" in {wrong.size} of {array.size} places" if array.ndim else ""
         raise ValueError(f"{name} must be finite{bound}, got {wrong.flat[0]:g}{where}")
     if isinstance(value, Array):
-        _right[name, least] = weakref.ref(value)
+        _right[name, dtype, least] = weakref.ref(value)
 
 
 def _fine(array: np.ndarray, least: float | None) -> bool:
@@ -151,55 +172,11 @@ def _fine(array: np.ndarray, least: float | None) -> bool:
     return bool(array.min() >= least and array.max() < math.inf)
 
 
-def is_concrete(value: Any) -> bool:
-    """True where a value can be looked at: not traced, and not held by other processes."""
-    if isinstance(value, Tracer):
-        return False
-    return not isinstance(value, jax.Array) or value.is_fully_addressable
-
-
-def at_hand(array: Array) -> bool:
-    """True where an array can be looked at and is on a CPU."""
-    return is_concrete(array) and next(iter(array.devices())).platform == "cpu"
-
-
-def on_host(value: Any) -> np.ndarray | None:
-    """The plain numbers of a NumPy array, or of a list or tuple of Python's, else None.
-
-    Those may be checked where they are, and copied to a device by `put`.
-    """
-    if isinstance(value, list | tuple):
-        if not all(type(leaf) in (int, float) for leaf in jax.tree.leaves(value)):
-            return None
-        value = np.asarray(value)  # raises `ValueError` for lists of several lengths
-    elif type(value) is not np.ndarray:
-        return None
-    if value.dtype.kind not in "fiu" or value.dtype.itemsize > 8:
-        return None
-    # Of another byte order, as files of FITS have it, JAX takes none.
-    return value.astype(value.dtype.newbyteorder("="), copy=False)
-
-
-def host_known(*arrays: Array | np.ndarray | None) -> bool:
-    """True where what little is to be computed of arrays may be in NumPy, without a program.
-
-    That is of known values of NumPy's own types, on one CPU device; None counts as one.
-    """
-    return all(
-        array is None
-        or (
-            array.dtype in (jnp.float32, jnp.float64, jnp.int32, bool)
-            and (isinstance(array, np.ndarray) or (at_hand(array) and len(array.devices()) == 1))
-        )
-        for array in arrays
-    )
-
-
 def _as_array(value: Any, name: str) -> Array | np.ndarray:
     try:
         plain = on_host(value)
         return jnp.asarray(value) if plain is None else plain
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         if isinstance(error, jax.errors.JAXTypeError):  # of tracing
             raise
         raise ValueError(f"expected real numbers{_for(name)}, got {described(value)}") from None
@@ -276,12 +253,15 @@ def check_number(
     above: float = -math.inf,
     infinite: bool = False,
 ) -> float:
-    """A Python number known at trace time; raises `ValueError` where it is none or out of range."""
+    """A Python number known at trace time; raises `ValueError` where it is none or out of range.
+
+    Finite is what float32 holds, since most numbers meet arrays of float32.
+    """
     number = None
     if isinstance(value, int | float | np.number) and not isinstance(
         value, bool | np.complexfloating
     ):
-        number = float(value)
+        number = as_double(name, value)
     elif isinstance(value, np.ndarray | jax.Array) and is_concrete(value):
         number = float(value) if value.ndim == 0 and value.dtype.kind in "fiu" else None
     if number is None or not (least <= number <= most and number > above):
@@ -290,9 +270,18 @@ def check_number(
         bounds += [f"<= {most:g}"] if most < math.inf else []
         range_ = f" {' and '.join(bounds)}" if bounds else ""
         raise ValueError(f"{name} must be a number{range_}, got {described(value)}")
-    if not infinite and math.isinf(number):
-        raise ValueError(f"{name} must be finite, got {described(value)}")
+    if not infinite and abs(number) > _LARGEST:
+        kind = "" if math.isinf(number) else " in float32"
+        raise ValueError(f"{name} must be finite{kind}, got {described(value)}")
     return number
+
+
+def as_double(name: str, value: Any) -> float:
+    """The number in float64; raises `ValueError` for an integer beyond it."""
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{name} must be finite in float64, got {described(value)}") from None
 
 
 def check_cosine(transfer: Any) -> None:

@@ -11,8 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .checks import at_hand, check_finite, on_host, said_dtype
+from .checks import check_finite, said_dtype
 from .host import put
+from .known import at_hand, on_host
 
 # What stands beyond the edges of a texture.
 Wrap = Literal["repeat", "clamp", "mirror"]

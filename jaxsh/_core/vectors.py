@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .checks import as_float, is_concrete
+from .checks import as_float
+from .known import is_concrete
 
 
 def components_first(vectors: Float[Array, "*batch 3"]) -> Float[Array, "3 1 n"]:

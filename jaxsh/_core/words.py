@@ -23,6 +23,8 @@ def reason(said: BaseException | str, most: int = 200) -> str:
 
 def described(value: Any) -> str:
     """Says in a few words what was given."""
+    if isinstance(value, int) and value.bit_length() > 1024:  # Python does not write the longest
+        return f"an integer of {value.bit_length()} bits"
     if value is None or isinstance(value, str | bool | int | float | complex | np.number):
         text = repr(value)
         return text if len(text) <= 60 else f"{text[:57]}…"

@@ -10,7 +10,8 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_cosine, check_options, check_type, is_concrete
+from .._core.checks import as_float, check_cosine, check_options, check_type
+from .._core.known import is_concrete
 from ..harmonics import degree_of
 from ..transfer import AbstractTransfer, Material, Transfer
 from ..transfer._glossy_kernels import checked_eye, checked_material, checked_one_light

@@ -4,7 +4,8 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_finite, is_concrete
+from .._core.checks import as_finite
+from .._core.known import is_concrete
 
 # How far from 1 the length of a normal may be: what halves and written decimals leave.
 _UNIT = 1e-2
@@ -44,7 +45,7 @@ class Points(eqx.Module):
         self.positions = as_finite(positions, "positions", wait=True)
         self.normals = None
         if normals is not None:
-            self.normals = as_finite(normals, "normals", wait=True).astype(self.positions.dtype)
+            self.normals = as_finite(normals, "normals", dtype=self.positions.dtype, wait=True)
 
     def __check_init__(self):
         shape = self.positions.shape

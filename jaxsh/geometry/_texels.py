@@ -17,9 +17,9 @@ from .._core.checks import (
     check_size,
     check_type,
     described,
-    is_concrete,
 )
 from .._core.host import put
+from .._core.known import is_concrete
 from .._core.linalg import einsum
 from .._core.xla import keep_rows, rows_are_split
 from ._atlas import Covered, barycentric, cover, nearest, places

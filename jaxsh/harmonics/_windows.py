@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_float, check_choice, check_degree, is_concrete
+from .._core.checks import align, as_float, check_choice, check_degree
 from .._core.host import put
+from .._core.known import is_concrete
 from ._indexing import degrees, orders
 
 WINDOWS = ("none", "hann", "lanczos", "zonal-sinc", "positive")

@@ -15,10 +15,9 @@ from .._core.checks import (
     check_coefficients,
     check_degree,
     check_flag,
-    host_known,
-    is_concrete,
 )
 from .._core.host import put
+from .._core.known import host_known, is_concrete
 from ._indexing import degrees
 
 

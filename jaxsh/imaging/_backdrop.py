@@ -6,8 +6,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._core.checks import check_type, host_known, is_concrete
+from .._core.checks import check_type
 from .._core.host import put
+from .._core.known import host_known, is_concrete
 from .._core.pictures import as_picture, as_radiance, check_values
 from .._core.xla import keep_rows, rounded_once
 from ._camera import Camera, host_rays

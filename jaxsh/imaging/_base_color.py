@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from .._core.checks import at_hand, check_type
+from .._core.checks import check_type
+from .._core.known import at_hand
 from .._core.pictures import Wrap
 from .._core.xla import keep_rows
 from ..geometry import BaseColor, Mesh, Texels

@@ -10,8 +10,9 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
-from .._core.checks import as_float, check_choice, check_number, described, host_known, is_concrete
+from .._core.checks import as_float, check_choice, check_number, described
 from .._core.host import put
+from .._core.known import host_known, is_concrete
 from .._core.linalg import einsum
 from .._core.pictures import as_picture, as_radiance
 from .._core.srgb import LUMINANCE

@@ -9,8 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from .._core.checks import as_float, check_size, check_type, is_concrete
+from .._core.checks import as_float, check_size, check_type
 from .._core.host import put
+from .._core.known import is_concrete
 from .._core.linalg import einsum
 from .._core.xla import keep_rows, rows_are_split
 from ..geometry import Mesh, RayScene, ray_scene

@@ -13,8 +13,8 @@ from .._core.checks import (
     check_size,
     check_type,
     described,
-    is_concrete,
 )
+from .._core.known import is_concrete
 from ..transfer import Transfer
 from ..transfer._glossy_kernels import checked_albedo
 from ._result import Recovered

@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float
 
-from .._core.checks import check_function, check_number, check_size, is_concrete
+from .._core.checks import check_function, check_number, check_size
+from .._core.known import is_concrete
 from .._core.linalg import matmul
 from .._core.xla import on_mesh
 from ..harmonics import degree_of, evaluate

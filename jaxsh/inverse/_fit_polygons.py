@@ -11,7 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import check_all, check_flag, check_type, is_concrete
+from .._core.checks import check_all, check_flag, check_type
+from .._core.known import is_concrete
 from .._core.linalg import einsum
 from .._core.xla import in_turn, on_mesh, rows_at_once
 from ..midrange import Polygon

@@ -4,7 +4,8 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_finite, as_float, check_flag, check_type, is_concrete
+from .._core.checks import as_finite, as_float, check_flag, check_type
+from .._core.known import is_concrete
 from ..geometry import Mesh
 
 # A vertex may be this far out of the plane, as a share of the polygon's extent.

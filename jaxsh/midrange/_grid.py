@@ -10,7 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, Int
 
-from .._core.checks import as_finite, check_size, described, is_concrete
+from .._core.checks import as_finite, check_size, described
+from .._core.known import is_concrete
 from .._core.xla import on_mesh, rounded_once
 from ._expansion import check_positions
 from ._weights import Cells, Weights

@@ -18,8 +18,8 @@ from .._core.checks import (
     check_degree,
     check_type,
     check_vectors,
-    is_concrete,
 )
+from .._core.known import is_concrete
 from .._core.xla import as_one, in_blocks, rows_at_once
 from ._arcs import group_bytes, pair_bytes
 from ._emitters import Polygon, is_convex, unit_normal

@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_all, is_concrete
+from .._core.checks import as_float, check_all
+from .._core.known import is_concrete
 from ..geometry import Mesh, RayScene, ray_scene
 from ..imaging import look_up
 from ..sphere import cube_map

@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, as_finite, check_degree, check_type, check_vectors, is_concrete
+from .._core.checks import align, as_finite, check_degree, check_type, check_vectors
+from .._core.known import is_concrete
 from ..harmonics import degrees, evaluate, evaluate_with_gradient
 from ._emitters import Sphere
 from ._vectors import inverse_power

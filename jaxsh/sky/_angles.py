@@ -61,7 +61,7 @@ def kept(value: Float[ArrayLike, "..."], name: str) -> Float[Array | np.ndarray,
         array = np.asarray(value)
         # Of another byte order, `jit` would take the bytes for those of other numbers.
         if array.dtype.kind == "f" and array.dtype.itemsize <= 8 and array.dtype.isnative:
-            check_finite(name, array)
+            check_finite(name, array, dtype=jax.dtypes.canonicalize_dtype(array.dtype))
             return array.astype(jax.dtypes.canonicalize_dtype(array.dtype), copy=False)
     return as_finite(value, name)
 

@@ -114,7 +114,7 @@ def smallest_luminance(
     """
     check_choice("reading", reading, get_args(Reading))
     sun = directions(sun, "sun")
-    turbidity = as_finite(turbidity, "turbidity").astype(sun.dtype)
+    turbidity = as_finite(turbidity, "turbidity", dtype=sun.dtype)
     check_batches(sun=sun.shape, turbidity=(*turbidity.shape, 1))
     return _smallest(sun, turbidity, reading, check_degree(degree))
 

@@ -18,9 +18,9 @@ from .._core.checks import (
     check_size,
     check_type,
     described,
-    is_concrete,
 )
 from .._core.devices import Devices, automatic, last_of, mesh_of, share
+from .._core.known import is_concrete
 from .._core.linalg import einsum, in_full, matmul
 from ..harmonics import orders
 from ._angles import half_rows
@@ -137,7 +137,7 @@ def fit(
     exact = project(model, suns, *numbers, degree=degree, symmetric=True)
     _check_finite(exact, theta, numbers)
     channels = exact.shape[-2]
-    mix = jnp.eye(channels) if mix is None else as_finite(mix, "mix").astype(exact.dtype)
+    mix = jnp.eye(channels) if mix is None else as_finite(mix, "mix", dtype=exact.dtype)
     if mix.shape != (channels, channels):
         raise ValueError(f"expected mix ({channels}, {channels}), got shape {mix.shape}")
     rows = half_rows(degree)

@@ -6,14 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import (
-    align,
-    as_finite,
-    as_float,
-    check_batches,
-    check_coefficients,
-    is_concrete,
-)
+from .._core.checks import align, as_finite, as_float, check_batches, check_coefficients
+from .._core.known import is_concrete
 from ..harmonics import degree_of, index, num_coefficients
 
 

@@ -11,7 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import check_batches, check_degree, check_vectors, is_concrete
+from .._core.checks import check_batches, check_degree, check_vectors
+from .._core.known import is_concrete
 from .._core.linalg import einsum, matmul
 from ._angles import (
     kept,

@@ -6,7 +6,8 @@ from typing import Literal, get_args
 import numpy as np
 from jaxtyping import Array
 
-from .._core.checks import check_choice, is_concrete
+from .._core.checks import check_choice
+from .._core.known import is_concrete
 
 Check = Literal["raise", "warn", "allow"]
 

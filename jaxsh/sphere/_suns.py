@@ -9,8 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_float, check_degree, check_size, host_known
+from .._core.checks import as_float, check_degree, check_size
 from .._core.host import put
+from .._core.known import host_known
 from .._core.linalg import einsum
 from .._core.vectors import checked_rotation, components_first, normalize
 from .._core.xla import keep_rows

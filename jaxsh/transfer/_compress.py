@@ -9,14 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int, UInt
 
-from .._core.checks import (
-    check_finite,
-    check_flag,
-    check_known,
-    check_size,
-    check_type,
-    is_concrete,
-)
+from .._core.checks import check_finite, check_flag, check_known, check_size, check_type
+from .._core.known import is_concrete
 from ._bake._passes import progress_bar
 from ._compressed import CompressedTransfer, index_type
 from ._stored import StoredTransfer

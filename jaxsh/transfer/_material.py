@@ -6,8 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import as_finite, check_finite, check_known, check_type, is_concrete
+from .._core.checks import as_double, as_finite, check_finite, check_known, check_type
 from .._core.devices import Devices, mesh_of, share, whole
+from .._core.known import is_concrete
 from ..harmonics import degree_of
 
 
@@ -16,7 +17,9 @@ def _as_strong(name: str, least: float | None):
 
     def convert(value: ArrayLike) -> Float[Array, "..."]:
         if type(value) in (int, float):
-            value = np.asarray(value, jnp.result_type(float))
+            dtype = jnp.result_type(float)
+            check_finite(name, as_double(name, value), dtype=dtype, least=least)
+            value = np.asarray(value, dtype)
         array = as_finite(value, name, least=least, wait=True)
         return array.astype(array.dtype) if array.weak_type else array
 
@@ -208,7 +211,7 @@ def checked_light(
 
     Raises `ValueError` for one that is at hand and not finite.
     """
-    light = as_finite(light, "light")
+    light = as_finite(light, "light", dtype=dtype)
     lights = light.shape[:-2][-1:]  # () where all vertices share one
     if light.ndim < 2 or light.shape[-2] != 3 or lights not in ((), (1,), (count,)):
         raise ValueError(
@@ -220,7 +223,7 @@ def checked_light(
             f"the light's degree {degree_of(light.shape[-1])} is above the transfer's, {degree}; "
             f"cut it to light[..., :{(degree + 1) ** 2}]"
         )
-    return _cast(light, dtype)
+    return light
 
 
 def checked_one_light(
@@ -245,6 +248,9 @@ def checked_material(material: Material, count: int, dtype: jnp.dtype) -> Materi
             )
     if all(array.dtype == dtype for array in jax.tree.leaves(material)):
         return material
+    for name in names:
+        if getattr(material, name) is not None:
+            check_finite(f"{name} of the material", getattr(material, name), dtype=dtype)
     return jax.tree.map(lambda array: array.astype(dtype), material)
 
 
@@ -253,25 +259,20 @@ def checked_albedo(
 ) -> Float[Array | np.ndarray, "..."]:
     """Casts the albedo of a diffuse surface: a number, RGB, or per vertex with one or three."""
     if isinstance(albedo, int | float) and not isinstance(albedo, bool):
-        check_finite("albedo", float(albedo), least=0.0)
+        check_finite("albedo", as_double("albedo", albedo), dtype=dtype, least=0.0)
         return np.asarray(albedo, dtype)
-    albedo = as_finite(albedo, "albedo", least=0.0)
+    albedo = as_finite(albedo, "albedo", dtype=dtype, least=0.0)
     if albedo.shape not in ((), (3,), (count, 1), (count, 3)):
         raise ValueError(
             f"expected albedo as a number, (3,), ({count}, 1) or ({count}, 3), got shape "
             f"{albedo.shape}"
         )
-    return _cast(albedo, dtype)
+    return albedo
 
 
 def checked_eye(eye: Float[ArrayLike, "..."], dtype: jnp.dtype) -> Float[Array, " 3"]:
     """Casts a point or direction (3,)."""
-    eye = as_finite(eye, "eye")
+    eye = as_finite(eye, "eye", dtype=dtype)
     if eye.shape != (3,):
         raise ValueError(f"expected eye (3,), got shape {eye.shape}")
-    return _cast(eye, dtype)
-
-
-def _cast(array: Array, dtype: jnp.dtype) -> Array:
-    # To cast to the same type does nothing, but takes time of every frame.
-    return array if array.dtype == dtype else array.astype(dtype)
+    return eye

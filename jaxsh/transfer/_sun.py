@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._core.checks import align, check_flag, check_type, is_concrete
+from .._core.checks import align, check_flag, check_type
+from .._core.known import is_concrete
 from .._core.linalg import einsum, matmul
 from .._core.xla import in_blocks, rows_at_once
 from ..geometry import Mesh, RayScene

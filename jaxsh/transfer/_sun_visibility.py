@@ -17,11 +17,10 @@ from .._core.checks import (
     check_known,
     check_size,
     check_type,
-    host_known,
-    is_concrete,
 )
 from .._core.devices import Devices, mesh_of, share, whole
 from .._core.host import cores, put
+from .._core.known import host_known, is_concrete
 from ..geometry import Mesh, Points, RayScene, Texels, ray_scene
 from ..sphere import Suns
 from ._bake._directions import spread

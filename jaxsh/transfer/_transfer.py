@@ -18,9 +18,9 @@ from .._core.checks import (
     check_flag,
     check_known,
     check_type,
-    is_concrete,
 )
 from .._core.devices import Devices, last_of, mesh_of, own_numbers, share
+from .._core.known import is_concrete
 from .._core.linalg import shading_matmul, shading_tall_product
 from ..geometry import Mesh, Points, Surface, Texels
 from ..harmonics import degree_of, num_coefficients
