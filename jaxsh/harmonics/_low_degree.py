@@ -36,6 +36,8 @@ class _Factors(NamedTuple):
 
 def points_first(vectors: Float[Array, "n 3"], degree: int) -> Float[Array, "n k"]:
     """Harmonics of vectors of any length, coefficients last."""
+    if degree == 1:
+        return _first_degree(vectors).T
     reciprocal = _reciprocals(vectors)[:, None]
     x, y, z = (_shortened(vectors[:, i : i + 1], reciprocal) for i in range(3))
     return products(x, y, z, degree, (1, -1))
@@ -43,6 +45,8 @@ def points_first(vectors: Float[Array, "n 3"], degree: int) -> Float[Array, "n k
 
 def coefficients_first(vectors: Float[Array, "n 3"], degree: int) -> Float[Array, "k n"]:
     """Harmonics of vectors of any length, coefficients first."""
+    if degree == 1:
+        return _first_degree(vectors)
 
     def units(vectors):
         reciprocal = _reciprocals(vectors)
@@ -50,6 +54,14 @@ def coefficients_first(vectors: Float[Array, "n 3"], degree: int) -> Float[Array
 
     x, y, z = materialize(units, vectors)[:, None]
     return products(x, y, z, degree, (-1, 1))
+
+
+def _first_degree(vectors: Float[Array, "n 3"]) -> Float[Array, "4 n"]:
+    """Harmonics of degree 0 and 1: a constant and unit vectors, of which no factor is shared."""
+    reciprocal = _reciprocals(vectors)
+    constant, scale = (np.sqrt(value / np.pi).astype(vectors.dtype) for value in (0.25, 0.75))
+    x, y, z = (scale * _shortened(vectors[:, i], reciprocal) for i in range(3))
+    return jnp.stack([constant + 0 * x, y, z, x])  # NaN in all rows where a vector is zero
 
 
 def _reciprocals(vectors: Float[Array, "n 3"]) -> Float[Array, " n"]:
